@@ -1,0 +1,35 @@
+"""The catalogue of effects.  A new effect is one file here and one line below."""
+
+from workbench.effects.bristle_friction import BristleFriction
+from workbench.effects.five_port_valve import FivePortValve
+from workbench.effects.forces import ConstantForce, EndCushion, EndStops, SpringForce, Weight
+from workbench.effects.leaks import ChamberLeak, PistonLeak
+from workbench.effects.sensor_offset import (
+    ForceSensorOffset,
+    PositionSensorOffset,
+    PressureSensorOffset,
+)
+from workbench.effects.supply_droop import SupplyDroop
+from workbench.effects.valve_command import CommandDelay, DeadZone, ValveLag, ValveOffset
+from workbench.effects.wall_heat import WallHeat
+
+CATALOGUE = (
+    BristleFriction,
+    ChamberLeak,
+    CommandDelay,
+    ConstantForce,
+    DeadZone,
+    EndCushion,
+    EndStops,
+    FivePortValve,
+    ForceSensorOffset,
+    PistonLeak,
+    PositionSensorOffset,
+    PressureSensorOffset,
+    SpringForce,
+    SupplyDroop,
+    ValveLag,
+    ValveOffset,
+    WallHeat,
+    Weight,
+)

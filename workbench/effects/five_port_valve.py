@@ -1,0 +1,119 @@
+"""A 5/3 proportional directional control valve feeding two chambers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import casadi as ca
+
+from workbench.air import GAS_CONSTANT_J_KG_K, FlowLaw, IsoLaw, NozzleLaw, Path, path_between
+from workbench.effect import (
+    Balance,
+    Cause,
+    Conditions,
+    Effect,
+    Expression,
+    MassFlow,
+    form,
+    strength,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class FivePortValve(Effect):
+    """Spool above centre: ``first`` is charged and ``second`` exhausted; below, the reverse.
+
+    s        = (u - u_c) / (10 V - u_c)  above,   (u_c - u) / u_c  below the centre
+    A_path   = A_max f [1 - (1 - s)^e],  f = f_supply, or f_exhaust (1 - share)
+    mdot     = C_d A_path C_chk p_u / sqrt(T_u) psi(p_d / p_u)  +  leak
+
+    The dead zone alters the command before it comes here; ``underlap_v`` opens every path that
+    much earlier, so that near the centre all four are open at once.  The closed-centre leak is one
+    constant effective area on each of the four paths with the nozzle law, which rests at 0.80746
+    of the supply pressure (physics.md 1.1 d; paper 002's P_0 is this value).
+
+    Source: paper 002 Eqs. 1 to 3 and Fig. 4, arguments by errata E002-1 to E002-4.  The area law,
+    its exponent 1.6, the fractions and b, a, m are chosen: the paper's look-up tables are not
+    printed.
+    """
+
+    causes = (
+        Cause(
+            name="exhaust_restriction",
+            strength="exhaust_restriction_share",
+            balance=Balance.FLOW,
+            drivers=("command", "exhausting chamber pressure"),
+            shown_by="exhaust from full pressure at several openings",
+            source="paper 002 (silencers); physics.md section 6",
+        ),
+        Cause(
+            name="spool_leak",
+            strength="leak_area_m2",
+            balance=Balance.MASS,
+            drivers=("pressures while the valve is closed",),
+            shown_by="valve closed for 20 s from two different pressures",
+            source="paper 002 (cracking ratio, P_0); physics.md 1.1 d",
+        ),
+        Cause(
+            name="valve_underlap",
+            strength="underlap_v",
+            balance=Balance.VALVE,
+            drivers=("command near centre",),
+            kinked=True,
+            shown_by="slow voltage ramp through the centre",
+            source="paper 000, method 3; physics.md 2.1 two-flow underlap",
+        ),
+    )
+
+    first: str
+    second: str
+    gas_constant_j_kg_k: float = GAS_CONSTANT_J_KG_K
+
+    flow_area_m2: Expression = form(1e-5, lower=1e-9, upper=1e-3, relative_deviation=0.05)
+    exhaust_restriction_share: Expression = strength(typical=0.5, upper=0.9)
+    leak_area_m2: Expression = strength(typical=2e-7, upper=5e-6)
+    underlap_v: Expression = strength(typical=0.3, upper=1.5, deviation=0.02)
+
+    discharge_coefficient: Expression = form(0.5513, lower=0.1, upper=1.0)
+    supply_fraction: Expression = form(0.80, lower=0.05, upper=1.5)
+    exhaust_fraction: Expression = form(0.65, lower=0.05, upper=1.5)
+    area_exponent: Expression = form(1.6, lower=1.0, upper=3.0)
+    centre_v: Expression = form(5.0, lower=0.1, upper=9.9)
+    full_v: Expression = form(10.0, lower=1.0, upper=24.0)
+    supply_critical_ratio: Expression = form(0.35, lower=0.05, upper=0.6)
+    exhaust_critical_ratio: Expression = form(0.30, lower=0.05, upper=0.6)
+    cracking_ratio: Expression = form(0.995, lower=0.8, upper=1.0)
+    subsonic_index: Expression = form(0.52, lower=0.3, upper=0.9)
+
+    def terms(self, now: Conditions) -> Iterator[MassFlow]:
+        offset_v = now[self.name].command_v - self.centre_v
+        forward = self._area_m2(offset_v, self.full_v - self.centre_v)
+        reverse = self._area_m2(-offset_v, self.centre_v)
+        yield from self._port(self.first, forward, reverse, now)
+        yield from self._port(self.second, reverse, forward, now)
+
+    def _area_m2(self, offset_v: Expression, range_v: Expression) -> Expression:
+        """Effective area of a path, without its fraction, at an offset towards its own side."""
+        opening = ca.fmax(offset_v + self.underlap_v, 0.0) / (range_v + self.underlap_v)
+        law = 1.0 - ca.fmax(1.0 - opening, 1e-12) ** self.area_exponent
+        return self.discharge_coefficient * self.flow_area_m2 * law
+
+    def _port(
+        self, chamber: str, charging_m2: Expression, exhausting_m2: Expression, now: Conditions
+    ) -> Iterator[MassFlow]:
+        gas, supply, outside = now[chamber], now["supply"], now["atmosphere"]
+        inlet = IsoLaw(self.supply_critical_ratio, self.cracking_ratio, self.subsonic_index)
+        outlet = IsoLaw(self.exhaust_critical_ratio, self.cracking_ratio, self.subsonic_index)
+        share = self.exhaust_fraction * (1.0 - self.exhaust_restriction_share)
+        charge = path_between(supply, gas, self.gas_constant_j_kg_k)
+        vent = path_between(gas, outside)
+        into_kg_s = self._flow_kg_s(charge, charging_m2 * self.supply_fraction, inlet)
+        out_kg_s = self._flow_kg_s(vent, exhausting_m2 * share, outlet)
+        yield MassFlow(chamber, into_kg_s, charge.temperature_k)
+        yield MassFlow("supply", -into_kg_s, charge.temperature_k)
+        yield MassFlow(chamber, -out_kg_s, vent.temperature_k)
+
+    def _flow_kg_s(self, path: Path, area_m2: Expression, law: FlowLaw) -> Expression:
+        """Flow through the controlled hole and through the closed-centre leak beside it."""
+        return path.flow_kg_s(area_m2, law) + path.flow_kg_s(self.leak_area_m2, NozzleLaw())

@@ -1,0 +1,145 @@
+"""Forces on a body besides friction and pressure: constant, spring, cushion, end stops."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import casadi as ca
+
+from workbench.effect import (
+    Balance,
+    Cause,
+    Conditions,
+    Effect,
+    Expression,
+    Force,
+    form,
+    strength,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConstantForce(Effect):
+    """Gravity along an inclined axis, a preload, a hanging load: F = F_0, signed.
+
+    Source: physics.md section 6 (gravity / incline).
+    """
+
+    causes = (
+        Cause(
+            name="constant_force",
+            strength="force_n",
+            balance=Balance.MOMENTUM,
+            drivers=("nothing: it is constant",),
+            shown_by="hold at rest, both chambers vented, in two orientations",
+            source="physics.md section 6 (gravity / incline)",
+        ),
+    )
+
+    body: str
+    force_n: Expression = strength(typical=22.0, lower=-500.0, upper=500.0)
+
+    def terms(self, now: Conditions) -> Iterator[Force]:
+        yield Force(self.body, self.force_n)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Weight(Effect):
+    """The weight of a body that moves vertically upwards: F = -M g share.
+
+    Source: physics.md 2.7, ``vertical_cylinder``.
+    """
+
+    body: str
+    mass_kg: Expression = form(1.0, lower=1e-3)
+    gravity_m_s2: Expression = form(9.81, lower=0.0)
+
+    def terms(self, now: Conditions) -> Iterator[Force]:
+        yield Force(self.body, -self.mass_kg * self.gravity_m_s2)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpringForce(Effect):
+    """A spring towards x_0: F = -k (x - x_0).
+
+    Source: interface.md section 6 (spring_force).
+    """
+
+    causes = (
+        Cause(
+            name="spring_force",
+            strength="stiffness_n_m",
+            balance=Balance.MOMENTUM,
+            drivers=("position",),
+            shown_by="hold at three positions",
+            source="interface.md section 6",
+        ),
+    )
+
+    body: str
+    stiffness_n_m: Expression = strength(typical=120.0, upper=1e3)
+    rest_m: Expression = form(0.1, lower=-10.0, upper=10.0)
+
+    def terms(self, now: Conditions) -> Iterator[Force]:
+        yield Force(self.body, -self.stiffness_n_m * (now[self.body].position_m - self.rest_m))
+
+
+@dataclass(frozen=True, kw_only=True)
+class EndCushion(Effect):
+    """Extra damping within a length of each end: F = -c v there, zero elsewhere.
+
+    The edge is a straight ramp over a tenth of the length, so that the force has a slope.
+
+    Source: physics.md section 6 (stops / cushioning); interface.md section 6.
+    """
+
+    causes = (
+        Cause(
+            name="end_cushion",
+            strength="damping_n_s_m",
+            balance=Balance.MOMENTUM,
+            drivers=("position near the ends", "velocity"),
+            shapes={"length_m": (0.008, 0.015, 0.03)},
+            shown_by="strokes into both ends at several speeds",
+            source="physics.md section 6 (stops / cushioning)",
+        ),
+    )
+
+    body: str
+    damping_n_s_m: Expression = strength(typical=150.0, upper=500.0)
+    length_m: Expression = form(0.015, lower=0.005, upper=0.04)
+    stroke_m: Expression = form(0.1, lower=1e-6)
+
+    def terms(self, now: Conditions) -> Iterator[Force]:
+        body = now[self.body]
+        to_end_m = ca.fmin(body.position_m, self.stroke_m - body.position_m)
+        within = (self.length_m - to_end_m) / (0.1 * self.length_m)
+        share = ca.fmin(ca.fmax(within, 0.0), 1.0)
+        yield Force(self.body, -self.damping_n_s_m * share * body.velocity_m_s)
+
+
+@dataclass(frozen=True, kw_only=True)
+class EndStops(Effect):
+    """A spring and damper that act only beyond the stroke, and only push.
+
+    F = max(0, s (lo - x) - d v)  for x < lo,   F = -max(0, s (x - hi) + d v)  for x > hi
+
+    Source: physics.md 1.4; paper 003 Eqs. 9 and 11, which may pull while separating (E003-6).
+    """
+
+    body: str
+    stiffness_n_m: Expression = strength(typical=2e6)
+    damping_n_s_m: Expression = form(2e3)
+    lower_m: Expression = form(0.0, lower=-10.0, upper=10.0)
+    upper_m: Expression = form(0.1, lower=-10.0, upper=10.0)
+
+    def terms(self, now: Conditions) -> Iterator[Force]:
+        body = now[self.body]
+        yield Force(self.body, self._push(self.lower_m - body.position_m, -body.velocity_m_s))
+        yield Force(self.body, -self._push(body.position_m - self.upper_m, body.velocity_m_s))
+
+    def _push(self, depth_m: Expression, depth_rate_m_s: Expression) -> Expression:
+        present = ca.fmin(self.stiffness_n_m, 1.0)  # without stiffness no damping either
+        force_n = self.stiffness_n_m * depth_m + present * self.damping_n_s_m * depth_rate_m_s
+        return ca.if_else(depth_m > 0, ca.fmax(force_n, 0.0), 0.0)

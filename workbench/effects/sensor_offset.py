@@ -1,0 +1,54 @@
+"""Sensors that read too much or too little by a constant."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from workbench.effect import Balance, Cause, Conditions, Effect, Expression, strength
+
+CAUSE = dict(
+    name="sensor_offset",
+    balance=Balance.SENSOR,
+    drivers=("nothing: it is constant",),
+    shown_by="hold at rest with both chambers vented to ambient",
+    source="interface.md section 6; physics.md section 6 (adc bias)",
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PressureSensorOffset(Effect):
+    """y = p + e.  Source: physics.md section 6 (adc bias)."""
+
+    causes = (Cause(strength="offset_pa", **CAUSE),)
+
+    signal: str
+    offset_pa: Expression = strength(typical=30e3, lower=-2e5, upper=2e5)
+
+    def alter(self, signal: str, value: Expression, now: Conditions) -> Expression:
+        return value + self.offset_pa if signal == self.signal else value
+
+
+@dataclass(frozen=True, kw_only=True)
+class PositionSensorOffset(Effect):
+    """y = x + e.  Source: physics.md section 6 (adc bias)."""
+
+    causes = (Cause(strength="offset_m", **CAUSE),)
+
+    signal: str
+    offset_m: Expression = strength(typical=10e-3, lower=-0.1, upper=0.1)
+
+    def alter(self, signal: str, value: Expression, now: Conditions) -> Expression:
+        return value + self.offset_m if signal == self.signal else value
+
+
+@dataclass(frozen=True, kw_only=True)
+class ForceSensorOffset(Effect):
+    """y = F + e.  Source: physics.md section 6 (adc bias)."""
+
+    causes = (Cause(strength="offset_n", **CAUSE),)
+
+    signal: str
+    offset_n: Expression = strength(typical=20.0, lower=-500.0, upper=500.0)
+
+    def alter(self, signal: str, value: Expression, now: Conditions) -> Expression:
+        return value + self.offset_n if signal == self.signal else value

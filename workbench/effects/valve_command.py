@@ -1,0 +1,178 @@
+"""What happens to a valve's command before it opens anything: offset, lag, delay, dead zone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from workbench.effect import (
+    Balance,
+    Cause,
+    Conditions,
+    Effect,
+    Expression,
+    Received,
+    State,
+    form,
+    strength,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ValveOffset(Effect):
+    """The spool's centre lies beside the nominal one: u -> u - u_off.
+
+    Source: papers 000 (5.25 V) and 002 (4.98 V); physics.md section 6 (offset).
+    """
+
+    causes = (
+        Cause(
+            name="valve_offset",
+            strength="offset_v",
+            balance=Balance.VALVE,
+            drivers=("command",),
+            shown_by="constant small commands to both sides",
+            source="papers 000, 002; physics.md section 6 (offset)",
+        ),
+    )
+
+    signal: str
+    offset_v: Expression = strength(typical=0.2, lower=-1.0, upper=1.0, deviation=0.02)
+
+    def alter(self, signal: str, value: Expression, now: Conditions) -> Expression:
+        return value - self.offset_v if signal == self.signal else value
+
+
+@dataclass(frozen=True, kw_only=True)
+class ValveLag(Effect):
+    """First-order lag of the spool: u -> lagged u, T d(lagged)/dt = u - lagged.
+
+    The strength is the time constant itself.  A lag with time constant zero is singular, so the
+    lagged state never gets faster than ``shortest_s`` and is mixed in by a share that vanishes at
+    the null:
+
+    T_e dz/dt = u - z,   T_e = T + shortest exp(-T / shortest)
+    out = u + g (z - u),   g = 1 - exp(-T / shortest)
+
+    For T well above the shortest time this is the plain lag; at T = 0 it passes u unchanged.
+
+    Source: paper 002 (100 Hz, neglected); physics.md section 6 (valve_dynamics); share form of
+    architecture.md section 4.
+    """
+
+    causes = (
+        Cause(
+            name="valve_lag",
+            strength="time_constant_s",
+            balance=Balance.VALVE,
+            drivers=("rate of the command",),
+            kinked=True,
+            shown_by="fast command steps and a multi-sine up to 20 Hz",
+            source="paper 002; physics.md section 6 (valve_dynamics)",
+        ),
+    )
+
+    signal: str
+    initial_v: float = 5.0
+    time_constant_s: Expression = strength(typical=20e-3, upper=0.2)
+    shortest_s: Expression = form(0.5e-3, lower=1e-4, upper=1e-2)
+
+    def states(self) -> Iterator[State]:
+        yield State("lagged_v", initial=self.initial_v, scale=1.0, tolerance=1e-2)
+
+    def alter(self, signal: str, value: Expression, now: Conditions) -> Expression:
+        if signal != self.signal:
+            return value
+        now.place(f"{self.name}.entering_v", value)
+        share = 1.0 - ca.exp(-self.time_constant_s / self.shortest_s)
+        return value + share * (now[self.name].lagged_v - value)
+
+    def rates(self, now: Conditions, received: Received) -> dict[str, Expression]:
+        own, shortest_s = now[self.name], self.shortest_s
+        effective_s = self.time_constant_s + shortest_s * ca.exp(-self.time_constant_s / shortest_s)
+        return {"lagged_v": (own.entering_v - own.lagged_v) / effective_s}
+
+
+@dataclass(frozen=True, kw_only=True)
+class DeadZone(Effect):
+    """Overlap of the spool: a band of commands around the centre that opens nothing.
+
+    u -> u_c + R (u - u_c - w) / (R - w)  above the band,  u_c inside,  likewise below
+
+    with R the distance from centre to full opening on that side, so that full command is full
+    opening for every half-width w.
+
+    Source: paper 002 Fig. 5 and Table 3 (zms 4.53 V, zmd 5.37 V); the rescaling is the convention
+    of physics.md 2.4.
+    """
+
+    causes = (
+        Cause(
+            name="valve_dead_zone",
+            strength="half_width_v",
+            balance=Balance.VALVE,
+            drivers=("command near centre",),
+            kinked=True,
+            shown_by="slow voltage ramp through the centre",
+            source="paper 002 Fig. 5, Table 3",
+        ),
+    )
+
+    signal: str
+    half_width_v: Expression = strength(typical=0.6, upper=2.0, deviation=0.02)
+    centre_v: Expression = form(5.0, lower=0.1, upper=9.9, deviation=0.02)
+    full_v: Expression = form(10.0, lower=1.0, upper=24.0)
+
+    def alter(self, signal: str, value: Expression, now: Conditions) -> Expression:
+        if signal != self.signal:
+            return value
+        offset_v, w = value - self.centre_v, self.half_width_v
+        above_v, below_v = self.full_v - self.centre_v, self.centre_v
+        above = ca.fmax(offset_v - w, 0.0) * above_v / (above_v - w)
+        below = ca.fmin(offset_v + w, 0.0) * below_v / (below_v - w)
+        return self.centre_v + above + below
+
+    def undo(self, wanted_v: float) -> float:
+        """The command that comes out as ``wanted_v``: what a controller sends to jump the band."""
+        offset_v, w = wanted_v - self.centre_v, self.half_width_v
+        above_v, below_v = self.full_v - self.centre_v, self.centre_v
+        if offset_v > 0:
+            return float(self.centre_v + w + offset_v * (above_v - w) / above_v)
+        if offset_v < 0:
+            return float(self.centre_v - w + offset_v * (below_v - w) / below_v)
+        return float(self.centre_v)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CommandDelay(Effect):
+    """A pure delay of a command, u(t - T), applied to the sampled sequence.
+
+    Between samples the command is interpolated linearly, so any T >= 0 is possible; at T = 0 the
+    sequence is unchanged.
+
+    Source: papers 000 and 001 (1 ms each way), 003 (3 ms); physics.md section 6 (valve_delay).
+    """
+
+    causes = (
+        Cause(
+            name="command_delay",
+            strength="delay_s",
+            balance=Balance.TIMING,
+            drivers=("rate of the command",),
+            kinked=True,
+            shown_by="fast command steps and a multi-sine up to 20 Hz",
+            source="papers 000, 001, 003; physics.md section 6 (valve_delay)",
+        ),
+    )
+
+    signal: str
+    delay_s: Expression = strength(typical=15e-3, upper=0.2)
+
+    def resample(self, channel: str, values: np.ndarray, sample_time_s: float) -> np.ndarray:
+        if channel != self.signal or self.delay_s == 0.0:
+            return values
+        samples = np.arange(len(values), dtype=float)
+        return np.interp(samples - float(self.delay_s) / sample_time_s, samples, values)

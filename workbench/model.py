@@ -1,0 +1,72 @@
+"""The one CasADi model of a plant, which simulation, design, estimation and fitting all read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+
+from workbench.effect import Conditions, Expression
+from workbench.rosenbrock import controlled_step
+
+
+@dataclass(frozen=True)
+class Model:
+    """A plant as CasADi expressions.  Every name reads ``part.quantity_unit``.
+
+    Attributes
+    ----------
+    states, commands, measured_inputs, parameters, measured
+        Names, in the order of the vectors x, u, d, p and y.
+    symbols
+        The column vectors x, u, d, p.
+    rates, outputs
+        dx/dt, shape (n_x, 1), and y, shape (n_y, 1).
+    flows
+        Every single flow, by ``(effect, kind, balance)``: who does what to whom.
+    tolerances
+        Error per step that the integrator lets pass, shape (n_x,).
+    conditions
+        Every quantity of the plant as an expression, for example ``chamber_a.temperature_k``.
+    """
+
+    states: tuple[str, ...]
+    commands: tuple[str, ...]
+    measured_inputs: tuple[str, ...]
+    parameters: tuple[str, ...]
+    measured: tuple[str, ...]
+    symbols: tuple[ca.SX, ...]
+    rates: ca.SX
+    outputs: ca.SX
+    flows: dict[tuple[str, str, str], Expression]
+    tolerances: np.ndarray
+    conditions: Conditions = field(repr=False)
+    _steps: dict[float, ca.Function] = field(default_factory=dict, repr=False)
+
+    @cached_property
+    def f(self) -> ca.Function:
+        """(x, u, d, p) -> (dx/dt, y).  The only place where the physics is evaluated."""
+        results = [self.rates, self.outputs]
+        return ca.Function("f", [*self.symbols], results, [*"xudp"], ["rates", "outputs"])
+
+    @cached_property
+    def jacobians(self) -> ca.Function:
+        """(x, u, d, p) -> (A, B, C, D): derivatives of rates and outputs in x and u."""
+        x, u, _, _ = self.symbols
+        blocks = [ca.jacobian(e, s) for e in (self.rates, self.outputs) for s in (x, u)]
+        return ca.Function("jacobians", [*self.symbols], blocks, [*"xudp"], [*"ABCD"])
+
+    def quantities(self, *names: str) -> ca.Function:
+        """(x, u, d, p) -> the named quantities, shape (n, 1)."""
+        values = ca.vertcat(*(self.conditions.read(name) for name in names))
+        return ca.Function("quantities", [*self.symbols], [values], [*"xudp"], ["values"])
+
+    def step(self, sample_time_s: float) -> ca.Function:
+        """(x, u, d, p) -> x one sample later with inputs held; see :mod:`workbench.rosenbrock`."""
+        if sample_time_s not in self._steps:
+            self._steps[sample_time_s] = controlled_step(
+                self.symbols, self.rates, sample_time_s, self.tolerances
+            )
+        return self._steps[sample_time_s]

@@ -1,0 +1,215 @@
+"""The parts that own a balance: a body its momentum, a chamber its gas, a supply its pressure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import casadi as ca
+
+from workbench.air import (
+    GAS_CONSTANT_J_KG_K,
+    HEAT_CAPACITY_RATIO,
+    LOWEST_PRESSURE_PA,
+    LOWEST_TEMPERATURE_K,
+)
+from workbench.effect import (
+    AddedMass,
+    Balance,
+    Cause,
+    Conditions,
+    Expression,
+    Force,
+    HeatFlow,
+    Kind,
+    MassFlow,
+    Part,
+    Received,
+    State,
+    Term,
+    form,
+    strength,
+)
+
+LOWEST_MASS_KG = 1e-9
+
+
+def total(terms: list[Term], kind: type[Term]) -> Expression:
+    """Sum of the values of one kind of term."""
+    return sum(term.value for term in terms if isinstance(term, kind))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Supply(Part):
+    """The compressed-air supply seen by the valve; a recorded pressure takes its place.
+
+    Source: paper 002 table of constants; 2 % and 2 K are physics.md's uncertainties (chosen).
+    """
+
+    pressure_pa: Expression = form(7e5, lower=1.0, upper=2e6, relative_deviation=0.02)
+    temperature_k: Expression = form(293.15, lower=200.0, upper=400.0, deviation=2.0)
+
+    def derive(self, now: Conditions) -> dict[str, Expression]:
+        return {"pressure_pa": self.pressure_pa, "temperature_k": self.temperature_k}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Atmosphere(Part):
+    """What surrounds the actuator.  Source: physics.md section 0."""
+
+    pressure_pa: Expression = form(1.013e5, lower=1.0, upper=2e5, relative_deviation=1e-3)
+    temperature_k: Expression = form(293.15, lower=200.0, upper=400.0)
+
+    def derive(self, now: Conditions) -> dict[str, Expression]:
+        return {"pressure_pa": self.pressure_pa, "temperature_k": self.temperature_k}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Body(Part):
+    """A body moving along one line.
+
+    (m + dm + sum of added masses) dv/dt = sum of forces
+
+    Source: paper 002 Eq. 9 and the like in 000, 001, 003.
+    """
+
+    causes = (
+        Cause(
+            name="added_mass",
+            strength="added_mass_kg",
+            balance=Balance.MOMENTUM,
+            drivers=("acceleration",),
+            kind=Kind.PARAMETER,
+            held="mass_kg",
+            shown_by="fast steps with and without a known mass added",
+            source="physics.md section 6 (payload)",
+        ),
+    )
+
+    mass_kg: Expression = form(1.0, lower=1e-3, relative_deviation=0.05)
+    added_mass_kg: Expression = strength(typical=1.0, lower=-1.0, upper=5.0)
+
+    initial_position_m: float = 0.0
+
+    def states(self) -> Iterator[State]:
+        yield State("position_m", self.initial_position_m, scale=0.1, tolerance=2e-6)
+        yield State("velocity_m_s", initial=0.0, scale=1.0, tolerance=2e-3)
+
+    def rates(self, now: Conditions, received: Received) -> dict[str, Expression]:
+        got = received(self.name)
+        mass_kg = self.mass_kg + self.added_mass_kg + total(got, AddedMass)
+        return {
+            "position_m": now[self.name].velocity_m_s,
+            "velocity_m_s": total(got, Force) / mass_kg,
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class HeldRod(Part):
+    """A rod held by a force sensor while its motion and the pressure are recorded.
+
+    sensor force = sum of forces on the rod; no state.
+
+    Source: physics.md 2.7, ``cylinder_bench``.
+    """
+
+    def close(self, now: Conditions, received: Received) -> dict[str, Expression]:
+        return {"force_n": total(received(self.name), Force)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class PressureFace(Part):
+    """A piston face under a recorded chamber pressure, ambient on the other side.
+
+    F = (p - p_atm) A
+
+    Source: physics.md 2.7, the plants of the real recordings.
+    """
+
+    body: str
+    area_m2: Expression = form(5e-4, lower=1e-9)
+
+    def terms(self, now: Conditions) -> Iterator[Force]:
+        gauge_pa = now[self.name].pressure_pa - now["atmosphere"].pressure_pa
+        yield Force(self.body, self.area_m2 * gauge_pa)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Chamber(Part):
+    """A gas volume closed by a moving body, with its pressure and its mass of gas as states.
+
+    V dp/dt = kappa R sum(mdot T) - kappa p dV/dt + (kappa - 1) sum(Q)
+    dm/dt   = sum(mdot),     T = p V / (m R)
+    V       = V_dead (1 + e) + A x   (side +1)   or   V_dead (1 + e) + A (L - x)   (side -1)
+
+    Source: paper 002 Eqs. 4 and 5 in the (p, m) form of physics.md 1.2 level 1, which conserves
+    mass by construction; dead volume by erratum E002-8.
+    """
+
+    causes = (
+        Cause(
+            name="dead_volume",
+            strength="dead_volume_change",
+            balance=Balance.MASS,
+            drivers=("position near the ends",),
+            kind=Kind.PARAMETER,
+            held="dead_volume_m3",
+            shown_by="strokes to both ends",
+            source="paper 002 table 6; physics.md section 6 (dead_volume)",
+        ),
+    )
+
+    body: str
+    side: int
+    area_m2: Expression = form(1e-3, lower=1e-9)
+    stroke_m: Expression = form(0.1, lower=1e-6)
+    dead_volume_m3: Expression = form(1e-5, lower=1e-9, relative_deviation=0.05)
+    dead_volume_change: Expression = strength(typical=0.5, lower=-0.87, upper=2.0)
+    gas_constant_j_kg_k: float = GAS_CONSTANT_J_KG_K
+    initial_pressure_pa: float = 1e5
+    initial_temperature_k: float = 293.15
+    initial_position_m: float = 0.0
+
+    def states(self) -> Iterator[State]:
+        filled_kg = self.filled_mass_kg(self.initial_pressure_pa, self.initial_position_m)
+        yield State("pressure_pa", self.initial_pressure_pa, scale=1e5, tolerance=20.0)
+        yield State("mass_kg", filled_kg, scale=1e-4, tolerance=1e-8)
+
+    def filled_mass_kg(self, pressure_pa: Expression, position_m: Expression) -> Expression:
+        """Mass of gas at a pressure and the initial temperature, the body at ``position_m``."""
+        gas_j_kg = self.gas_constant_j_kg_k * self.initial_temperature_k
+        return pressure_pa * self.volume_m3(position_m) / gas_j_kg
+
+    def volume_m3(self, position_m: Expression) -> Expression:
+        """Gas volume with the body at ``position_m``."""
+        travel_m = position_m if self.side > 0 else self.stroke_m - position_m
+        return self.dead_volume_m3 * (1.0 + self.dead_volume_change) + self.area_m2 * travel_m
+
+    def derive(self, now: Conditions) -> dict[str, Expression]:
+        own, body = now[self.name], now[self.body]
+        dead_m3 = self.dead_volume_m3 * (1.0 + self.dead_volume_change)
+        volume_m3 = ca.fmax(self.volume_m3(body.position_m), 0.1 * dead_m3)
+        pressure_pa = ca.fmax(own.pressure_pa, LOWEST_PRESSURE_PA)
+        content_j_k = ca.fmax(own.mass_kg, LOWEST_MASS_KG) * self.gas_constant_j_kg_k
+        travel_m = body.position_m if self.side > 0 else self.stroke_m - body.position_m
+        return {
+            "volume_m3": volume_m3,
+            "volume_rate_m3_s": self.side * self.area_m2 * body.velocity_m_s,
+            "temperature_k": ca.fmax(pressure_pa * volume_m3 / content_j_k, LOWEST_TEMPERATURE_K),
+            "length_m": travel_m,
+            "area_m2": self.area_m2,
+            "gas_constant_j_kg_k": self.gas_constant_j_kg_k,
+        }
+
+    def terms(self, now: Conditions) -> Iterator[Term]:
+        yield Force(self.body, self.side * self.area_m2 * now[self.name].pressure_pa)
+
+    def rates(self, now: Conditions, received: Received) -> dict[str, Expression]:
+        own, got, kappa = now[self.name], received(self.name), HEAT_CAPACITY_RATIO
+        carried = sum(t.value * t.temperature_k for t in got if isinstance(t, MassFlow))
+        energy_w = (
+            kappa * self.gas_constant_j_kg_k * carried
+            - kappa * own.pressure_pa * own.volume_rate_m3_s
+            + (kappa - 1.0) * total(got, HeatFlow)
+        )
+        return {"pressure_pa": energy_w / own.volume_m3, "mass_kg": total(got, MassFlow)}

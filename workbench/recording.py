@@ -1,0 +1,66 @@
+"""Recordings: named channels on one uniform time grid, measured or simulated alike."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Channels in SI units, named like the plant's signals; a missing sample is NaN.
+
+    Attributes
+    ----------
+    channels
+        Values by full name with unit, each of shape (n,).
+    noise
+        Standard deviation of the sensor noise by channel, where it is known.
+    starts
+        First sample of each piece, in order; a recording without gaps has one piece, (0,).
+        Pieces are simulated separately.
+    """
+
+    name: str
+    sample_time_s: float
+    channels: Mapping[str, np.ndarray]
+    noise: Mapping[str, float] = field(default_factory=dict)
+    starts: tuple[int, ...] = (0,)
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        lengths = {channel: len(values) for channel, values in self.channels.items()}
+        if len(set(lengths.values())) > 1:
+            raise ValueError(f"{self.name}: channels differ in length: {lengths}")
+
+    def __getitem__(self, channel: str) -> np.ndarray:
+        if channel not in self.channels:
+            raise KeyError(f"{self.name} has no {channel}; it has {', '.join(self.channels)}")
+        return self.channels[channel]
+
+    def __len__(self) -> int:
+        return len(next(iter(self.channels.values())))
+
+    @property
+    def time_s(self) -> np.ndarray:
+        """Sample times from zero, shape (n,)."""
+        return self.sample_time_s * np.arange(len(self))
+
+    def rows(self, channels: Iterable[str]) -> np.ndarray:
+        """The named channels, one per row, shape (n_channels, n)."""
+        found = [self[channel] for channel in channels]
+        return np.array(found) if found else np.zeros((0, len(self)))
+
+    def part(self, first: int, last: int) -> Recording:
+        """Samples ``first`` up to, not including, ``last``."""
+        cut = {name: values[first:last] for name, values in self.channels.items()}
+        inside = tuple(start - first for start in self.starts if first < start < last)
+        return replace(self, channels=cut, starts=(0, *inside))
+
+    @property
+    def pieces(self) -> tuple[Recording, ...]:
+        """The gap-free pieces, in order."""
+        ends = (*self.starts[1:], len(self))
+        return tuple(self.part(a, b) for a, b in zip(self.starts, ends, strict=True))

@@ -1,0 +1,74 @@
+"""Running a plant on recorded commands."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from workbench.plant import Plant
+from workbench.recording import Recording
+
+
+def inputs(plant: Plant, recording: Recording) -> tuple[np.ndarray, np.ndarray]:
+    """Commands and measured inputs as the plant gets them, shapes (n_u, n) and (n_d, n).
+
+    Causes in time (delay, pause) act here, on the sampled sequences.
+    """
+    model, dt = plant.model, recording.sample_time_s
+
+    def prepared(channel: str) -> np.ndarray:
+        values = recording[channel]
+        for member in plant.members:
+            values = member.resample(channel, values, dt)
+        return values
+
+    groups = (model.commands, model.measured_inputs)
+    u, d = ([prepared(name) for name in group] for group in groups)
+    n = len(recording)
+    return np.reshape(u, (len(u), n)), np.reshape(d, (len(d), n))
+
+
+def simulate(plant: Plant, recording: Recording, initial: np.ndarray | None = None) -> Recording:
+    """The plant's states and outputs under recorded inputs, held between samples.
+
+    ``recording`` holds the commands and measured inputs; ``initial`` is the state at the first
+    sample, shape (n_x,), the plant's own initial state by default.  Pieces restart from it.
+
+    Raises
+    ------
+    ArithmeticError
+        If the solution is not finite, naming the first bad time.
+    """
+    model, dt = plant.model, recording.sample_time_s
+    x0 = plant.initial if initial is None else np.asarray(initial, dtype=float)
+    u, d = inputs(plant, recording)
+    p = plant.nominal[2]
+    ends = (*recording.starts[1:], len(recording))
+    x = np.hstack(
+        [
+            _run(plant, x0, u[:, first:last], d[:, first:last], p, dt)
+            for first, last in zip(recording.starts, ends, strict=True)
+        ]
+    )
+    y = model.f.map(len(recording))(x, u, d, p)[1].full()
+    bad = ~np.isfinite(y).all(axis=0)
+    if bad.any():
+        raise ArithmeticError(
+            f"{plant.name}: the simulation is not finite from {dt * bad.argmax():.4g} s on"
+        )
+    names = (*model.commands, *model.measured_inputs, *model.states, *model.measured)
+    rows = np.vstack([recording.rows((*model.commands, *model.measured_inputs)), x, y])
+    channels = dict(zip(names, rows, strict=True))
+    return Recording(recording.name, dt, channels, starts=recording.starts, source="simulation")
+
+
+def _run(
+    plant: Plant, x0: np.ndarray, u: np.ndarray, d: np.ndarray, p: np.ndarray, dt: float
+) -> np.ndarray:
+    """States at every sample of one piece, shape (n_x, n)."""
+    n = max(u.shape[1], d.shape[1])
+    if not len(x0):
+        return np.zeros((0, n))
+    if n < 2:
+        return x0[:, None]
+    later = plant.model.step(dt).mapaccum(n - 1)(x0, u[:, :-1], d[:, :-1], p).full()
+    return np.hstack([x0[:, None], later])
