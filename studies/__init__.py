@@ -1,0 +1,1 @@
+"""Named, reproducible questions put to the workbench. Imports all; imported by nothing."""

@@ -1,0 +1,185 @@
+"""Random draws of a truth: one hidden effect and the small differences that are always on.
+
+Source: physics.md 2.4 (nominal values), 6 (effects); the sizes are those of the test bench.
+"""
+
+import zlib
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from studies.truth.drive import Drive
+
+NOMINAL = Drive()
+TANK_M3 = 1e-3
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """One effect that the detector has to find: its field, typical size, how it acts.
+
+    `signed`: the sign is drawn too. `replaces`: the size stands instead of the nominal value.
+    """
+
+    fields: tuple[str, ...]
+    typical: float
+    signed: bool = False
+    replaces: bool = False
+
+
+EFFECTS = {
+    "valve_dead_zone": Hidden(("dead_zone_half_width_v",), 0.6, replaces=True),
+    "valve_lag": Hidden(("valve_lag_s",), 0.020),
+    "spool_leak": Hidden(("spool_leak_m2",), 2e-7, replaces=True),
+    "exhaust_restriction": Hidden(("exhaust_restriction",), 0.5),
+    "supply_droop": Hidden(("supply_resistance_pa_s_kg",), 5e7),
+    "chamber_leak": Hidden(("chamber_a_leak_m2",), 3e-7),
+    "piston_leak": Hidden(("piston_leak_m2",), 5e-7),
+    "coulomb_friction": Hidden(("coulomb_n",), 60.0, replaces=True),
+    "stiction": Hidden(("stiction_excess_n",), 60.0, replaces=True),
+    "friction_asymmetry": Hidden(
+        ("coulomb_asymmetry", "stiction_asymmetry", "viscous_asymmetry"),
+        0.3,
+        signed=True,
+        replaces=True,
+    ),
+    "constant_force": Hidden(("constant_force_n",), 22.0, signed=True),
+    "sensor_offset": Hidden(("pressure_a_offset_pa",), 30e3, signed=True),
+    "quadratic_drag": Hidden(("quadratic_drag_n_s2_m2",), 400.0),
+}
+OUTSIDE_CATALOGUE = ("quadratic_drag",)
+HIDDEN = tuple(name for name in EFFECTS if name not in OUTSIDE_CATALOGUE)
+SMALLEST_SHARE, LARGEST_SHARE = 0.15, 0.60
+
+
+@dataclass(frozen=True)
+class Difference:
+    """One small deviation of the truth from the detector's model: field = nominal + change."""
+
+    field: str
+    change: float
+
+
+@dataclass(frozen=True)
+class Case:
+    """All drawn numbers of one recording pair.
+
+    `size` is the hidden size in SI (share of typical inside 0.15..0.6), 0 if nothing is hidden.
+    `accessories` are fields without effect of their own (wavelength, phase, valve damping, ...).
+    `shrunk` maps a field to the factor by which the misfit rule has reduced its difference.
+    """
+
+    hidden: str | None
+    seed: int
+    size: float
+    differences: tuple[Difference, ...]
+    accessories: tuple[tuple[str, float], ...]
+    shrunk: tuple[tuple[str, float], ...] = ()
+    redraws: int = 0
+
+    @property
+    def supply_recorded(self) -> bool:
+        """False if the supply pressure is not among the channels."""
+        return self.hidden != "supply_droop"
+
+
+def draw(hidden: str | None, seed: int) -> Case:
+    """The case of this effect and seed, before the misfit rule (`misfit.scaled`).
+
+    Raises KeyError for an unknown effect.
+    """
+    if hidden is not None and hidden not in EFFECTS:
+        raise KeyError(f"truth: {hidden} is not a hidden effect; there are {', '.join(EFFECTS)}")
+    rng = generator(hidden, seed, "draw")
+    return Case(hidden, seed, draw_size(hidden, rng), _differences(hidden, rng), _accessories(rng))
+
+
+def generator(hidden: str | None, seed: int, purpose: str) -> np.random.Generator:
+    """Random numbers that depend on case and purpose only, not on the batch."""
+    return np.random.default_rng([seed, zlib.crc32(f"{hidden}/{purpose}".encode())])
+
+
+def draw_size(hidden: str | None, rng: np.random.Generator) -> float:
+    """Log-uniform in 15..60 % of typical; a law outside the catalogue gets the upper half."""
+    if hidden is None:
+        return 0.0
+    effect = EFFECTS[hidden]
+    low = 0.30 if hidden in OUTSIDE_CATALOGUE else SMALLEST_SHARE
+    share = np.exp(rng.uniform(np.log(low), np.log(LARGEST_SHARE)))
+    return float(effect.typical * share * (rng.choice([-1, 1]) if effect.signed else 1))
+
+
+def _differences(hidden: str | None, rng: np.random.Generator) -> tuple[Difference, ...]:
+    """Changes of all fields; a field whose size is the hidden one keeps exactly that size."""
+    change = {
+        name: 0.05 * getattr(NOMINAL, name) * rng.standard_normal()
+        for name in (
+            "moving_mass_kg",
+            "dead_volume_a_m3",
+            "dead_volume_b_m3",
+            "flow_area",
+            "spool_leak_m2",
+            "heat_transfer_w_m2_k",
+            "coulomb_n",
+            "stiction_excess_n",
+            "viscous_n_s_m",
+        )
+    }
+    change["dead_zone_centre_v"] = 0.020 * rng.standard_normal()
+    change["dead_zone_half_width_v"] = 0.020 * rng.standard_normal()
+    change["supply_temperature_k"] = 2.0 * rng.standard_normal()
+    change["ambient_pressure_pa"] = 100.0 * rng.standard_normal()
+    supply = 0.02 * NOMINAL.supply_pressure_pa * rng.standard_normal()
+    if hidden == "supply_droop":
+        change["supply_pressure_pa"] = supply
+    change["wall_k_per_j"] = 1 / rng.uniform(60.0, 200.0)
+    change["valve_period_s"] = 1 / rng.uniform(80.0, 120.0)
+    change["area_exponent"] = rng.uniform(1.4, 1.8) - NOMINAL.area_exponent
+    change["friction_wave"] = rng.uniform(0.05, 0.10)
+    change["pressure_lag_s"] = rng.uniform(1e-3, 2e-3)
+    change["presliding_share"] = -rng.uniform(0.2, 0.4)
+    own = EFFECTS[hidden].fields if hidden else ()
+    return tuple(Difference(f, float(c)) for f, c in change.items() if f not in own)
+
+
+def _accessories(rng: np.random.Generator) -> tuple[tuple[str, float], ...]:
+    return (
+        ("valve_damping", float(rng.uniform(0.7, 1.0))),
+        ("wall_loss_w_k", float(rng.uniform(0.3, 1.0))),
+        ("friction_wavelength_m", float(rng.uniform(0.02, 0.10))),
+        ("friction_phase_rad", float(rng.uniform(0, 2 * np.pi))),
+    )
+
+
+def drive_of(case: Case, without: str = "") -> Drive:
+    """The true drive; `without` names a field whose difference is off, or "hidden"."""
+    changes = dict(case.accessories)
+    for difference in case.differences:
+        if difference.field != without:
+            changes[difference.field] = getattr(NOMINAL, difference.field) + difference.change
+    if case.hidden:
+        size = 0.0 if without == "hidden" else case.size
+        changes.update(_hidden_fields(case.hidden, size))
+    return replace(NOMINAL, **changes)
+
+
+def _hidden_fields(hidden: str, size: float) -> dict[str, float]:
+    if hidden == "supply_droop":  # no droop is an infinite tank; a resistance of 0 divides
+        return {"supply_resistance_pa_s_kg": size, "tank_per_m3": 1 / TANK_M3} if size else {}
+    return {field: size for field in EFFECTS[hidden].fields}
+
+
+def resized(case: Case, size: float) -> Case:
+    """The same case with another hidden size (counts as a redraw)."""
+    return replace(case, size=size, redraws=case.redraws + 1)
+
+
+def shrink(case: Case, factors: dict[str, float]) -> Case:
+    """The case with some differences multiplied by factors, which are noted in `shrunk`."""
+    differences = tuple(
+        Difference(x.field, x.change * factors.get(x.field, 1.0)) for x in case.differences
+    )
+    noted = dict(case.shrunk)
+    for field, factor in factors.items():
+        noted[field] = noted.get(field, 1.0) * factor
+    return replace(case, differences=differences, shrunk=tuple(sorted(noted.items())))

@@ -1,0 +1,137 @@
+"""Reference movements and the position loop with which a person would record the drive.
+
+Training: random position steps, a slow ramp, a multi-tone, a hold.  Validation: a slow triangle,
+a sine sweep, holds at rest.  Both 10 s at 1 kHz, inside 20..270 mm.
+"""
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+
+import numpy as np
+
+SAMPLES = 10_000
+START_M = 0.060
+LOW_M, HIGH_M = 0.035, 0.255
+TRAVEL_SPEED_M_S = 0.9
+
+
+def training_reference(rng: np.random.Generator) -> np.ndarray:
+    """Random steps with rests (6.4 s), ramp at 25..50 mm/s (0.8 s), multi-tone (2.8 s)."""
+    steps = _steps(rng, 6400)
+    ramp = steps[-1] + np.sign(0.145 - steps[-1]) * rng.uniform(0.025, 0.05) * _time(800)
+    return _clip(np.concatenate([steps, ramp, _multi_tone(rng, ramp[-1], 2800)]))
+
+
+def validation_reference(rng: np.random.Generator) -> np.ndarray:
+    """Hold, slow triangle, hold, fast move, falling-amplitude sine sweep, hold, creep."""
+    slope = rng.uniform(0.04, 0.07)
+    rise = START_M + slope * np.minimum(_time(2200), 2.2 - _time(2200)).clip(0)
+    parts = [
+        np.full(600, START_M),
+        rise,
+        np.full(600, rise[-1]),
+        _move(rise[-1], rng.uniform(0.235, HIGH_M), 900),
+    ]
+    parts.append(_sweep(rng, parts[-1][-1], 3800))
+    parts.append(_move(parts[-1][-1], rng.uniform(LOW_M, 0.08), 1000))
+    last = parts[-1][-1]
+    parts.append(last + rng.uniform(0.02, 0.05) * _time(SAMPLES - sum(map(len, parts))))
+    return _clip(np.concatenate(parts))
+
+
+def _time(samples: int) -> np.ndarray:
+    return np.arange(samples) * 1e-3
+
+
+def _clip(reference: np.ndarray) -> np.ndarray:
+    return np.clip(reference, LOW_M - 0.005, HIGH_M + 0.005)
+
+
+def _move(start: float, stop: float, samples: int, speed: float = TRAVEL_SPEED_M_S) -> np.ndarray:
+    """Half-cosine move with the given top speed, then rest."""
+    duration = max(np.pi / 2 * abs(stop - start) / speed, 0.05)
+    phase = np.minimum(_time(samples) / duration, 1.0)
+    return start + (stop - start) * 0.5 * (1 - np.cos(np.pi * phase))
+
+
+def _steps(rng: np.random.Generator, samples: int) -> np.ndarray:
+    """Steps between random positions; the first two cross most of the stroke and rest long."""
+    targets = [rng.uniform(0.23, HIGH_M), rng.uniform(LOW_M, 0.07)]
+    lengths = [1600, 1500]
+    while sum(lengths) < samples:
+        far = targets[-1] + rng.choice([-1, 1]) * rng.uniform(0.02, 0.16)
+        targets.append(far if LOW_M < far < HIGH_M else 0.29 - targets[-1])
+        lengths.append(int(rng.uniform(500, 1000)))
+    parts, last = [np.full(100, START_M)], START_M
+    for target, length in zip(targets, lengths, strict=True):
+        parts.append(_move(last, target, length, speed=rng.uniform(0.5, 1.1)))
+        last = parts[-1][-1]
+    return np.concatenate(parts)[:samples]
+
+
+def _multi_tone(rng: np.random.Generator, start: float, samples: int) -> np.ndarray:
+    """Four tones of 0.4..3 Hz around mid-stroke, faded in, with at most 0.8 m/s together."""
+    t = _time(samples)
+    frequency = np.array([0.45, 0.9, 1.7, 2.9]) * rng.uniform(0.9, 1.1, 4)
+    speed = np.array([0.25, 0.25, 0.2, 0.1]) * rng.uniform(0.8, 1.1, 4)
+    phase = rng.uniform(0, 2 * np.pi, 4)
+    tones = speed / (2 * np.pi * frequency) * np.sin(2 * np.pi * frequency * t[:, None] + phase)
+    fade = _move(0.0, 1.0, samples, speed=3.5)
+    return start + (0.145 - start) * fade + fade * tones.sum(axis=1)
+
+
+def _sweep(rng: np.random.Generator, start: float, samples: int) -> np.ndarray:
+    """Sine from 0.4 to about 2.5 Hz with falling amplitude, faded in from the start position."""
+    t = _time(samples)
+    low, high = 0.4 * rng.uniform(0.9, 1.1), 2.5 * rng.uniform(0.9, 1.1)
+    span = t[-1]
+    phase = 2 * np.pi * low * span / np.log(high / low) * ((high / low) ** (t / span) - 1)
+    amplitude = 0.095 * (low / high) ** (0.75 * t / span)
+    fade = _move(0.0, 1.0, samples, speed=3.0)
+    return start + fade * (0.145 + amplitude * np.cos(phase) - start)
+
+
+@dataclass(frozen=True)
+class Loop:
+    """PI position loop with feed-forward of the reference speed and a jump over the dead zone.
+
+    u = centre + du + jump sat(du/0.02 V),  du = k_p e + k_i sum(e) + k_v dr/dt - k_d dy/dt
+    Inside `rest_m` and with a resting reference the valve is closed and the integral frozen,
+    as a person stops the hunting of a drive with stiction.  Gains are of shape () or (n,).
+    """
+
+    centre_v: np.ndarray
+    jump_v: np.ndarray
+    k_p: float = 14.0
+    k_i: float = 15.0
+    k_v: float = 0.75
+    k_d: float = 0.4
+    rest_m: float = 1.5e-3
+    limit_v: float = 1.6
+
+
+def start_loop(position_m: np.ndarray) -> SimpleNamespace:
+    """Memory of the loop: integral, last position, filtered speed, whether it rests."""
+    n = len(position_m)
+    return SimpleNamespace(
+        integral=np.zeros(n), last=position_m.copy(), speed=np.zeros(n), resting=np.zeros(n, bool)
+    )
+
+
+def loop_command(loop: Loop, memory: SimpleNamespace, reference_m, speed_m_s, position_m):
+    """Command in volt from this sample's reference and reading; updates the memory."""
+    error = reference_m - position_m
+    memory.speed += 0.12 * ((position_m - memory.last) / 1e-3 - memory.speed)
+    memory.last = position_m.copy()
+    band = np.where(memory.resting, 2.5, 1.0) * loop.rest_m
+    memory.resting = (np.abs(error) < band) & (np.abs(speed_m_s) < 1e-4)
+    memory.integral += np.where(memory.resting, 0.0, 1e-3 * error)
+    memory.integral = np.clip(memory.integral, -0.03, 0.03)
+    du = (
+        loop.k_p * error
+        + loop.k_i * memory.integral
+        + loop.k_v * speed_m_s
+        - loop.k_d * memory.speed
+    )
+    du = np.where(memory.resting, 0.0, np.clip(du, -loop.limit_v, loop.limit_v))
+    return np.clip(loop.centre_v + du + loop.jump_v * np.clip(du / 0.02, -1, 1), 0.0, 10.0)
