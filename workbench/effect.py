@@ -261,6 +261,14 @@ class Effect:
         """Time derivative of each own state, in SI units per second."""
         return {}
 
+    def guess(self, seen: Mapping[str, np.ndarray]) -> dict[str, tuple[np.ndarray | float, float]]:
+        """Own states from what was recorded: value at every sample and its standard deviation.
+
+        ``seen`` holds recorded channels and estimates of earlier members, each of shape (n,).  A
+        state that is not named here starts at its initial value, give or take its scale.
+        """
+        return {}
+
     def resample(self, channel: str, values: np.ndarray, sample_time_s: float) -> np.ndarray:
         """The sampled command sequence as this effect hands it on, shape (n,): delay, pause."""
         return values

@@ -8,6 +8,7 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
+from workbench.compiled import compiled
 from workbench.effect import Conditions, Expression
 from workbench.rosenbrock import controlled_step
 
@@ -44,12 +45,18 @@ class Model:
     tolerances: np.ndarray
     conditions: Conditions = field(repr=False)
     _steps: dict[float, ca.Function] = field(default_factory=dict, repr=False)
+    _compiled: dict[float, ca.Function] = field(default_factory=dict, repr=False)
 
     @cached_property
     def f(self) -> ca.Function:
         """(x, u, d, p) -> (dx/dt, y).  The only place where the physics is evaluated."""
         results = [self.rates, self.outputs]
         return ca.Function("f", [*self.symbols], results, [*"xudp"], ["rates", "outputs"])
+
+    @cached_property
+    def h(self) -> ca.Function:
+        """(x, u, d, p) -> y alone, for where the rates are not needed."""
+        return ca.Function("h", [*self.symbols], [self.outputs], [*"xudp"], ["outputs"])
 
     @cached_property
     def jacobians(self) -> ca.Function:
@@ -64,9 +71,18 @@ class Model:
         return ca.Function("quantities", [*self.symbols], [values], [*"xudp"], ["values"])
 
     def step(self, sample_time_s: float) -> ca.Function:
-        """(x, u, d, p) -> x one sample later with inputs held; see :mod:`workbench.rosenbrock`."""
+        """(x, u, d, p) -> x one sample later with inputs held; see :mod:`workbench.rosenbrock`.
+
+        For building: it can be differentiated, and ``compiled`` with what is built from it.
+        """
         if sample_time_s not in self._steps:
             self._steps[sample_time_s] = controlled_step(
                 self.symbols, self.rates, sample_time_s, self.tolerances
             )
         return self._steps[sample_time_s]
+
+    def compiled_step(self, sample_time_s: float) -> ca.Function:
+        """The same as :meth:`step`, for running: machine code where there is a C compiler."""
+        if sample_time_s not in self._compiled:
+            self._compiled[sample_time_s] = compiled(self.step(sample_time_s))
+        return self._compiled[sample_time_s]

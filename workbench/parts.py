@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import casadi as ca
+import numpy as np
 
 from workbench.air import (
     GAS_CONSTANT_J_KG_K,
@@ -94,6 +95,13 @@ class Body(Part):
     def states(self) -> Iterator[State]:
         yield State("position_m", self.initial_position_m, scale=0.1, tolerance=2e-6)
         yield State("velocity_m_s", initial=0.0, scale=1.0, tolerance=2e-3)
+
+    def guess(self, seen: Mapping[str, np.ndarray]) -> dict[str, tuple[np.ndarray | float, float]]:
+        position_m = seen.get(f"{self.name}.position_m")
+        if position_m is None:
+            return {}
+        velocity_m_s = seen[f"{self.name}.velocity_m_s"]
+        return {"position_m": (position_m, 2e-5), "velocity_m_s": (velocity_m_s, 1e-2)}
 
     def rates(self, now: Conditions, received: Received) -> dict[str, Expression]:
         got = received(self.name)
@@ -184,6 +192,17 @@ class Chamber(Part):
         """Gas volume with the body at ``position_m``."""
         travel_m = position_m if self.side > 0 else self.stroke_m - position_m
         return self.dead_volume_m3 * (1.0 + self.dead_volume_change) + self.area_m2 * travel_m
+
+    def guess(self, seen: Mapping[str, np.ndarray]) -> dict[str, tuple[np.ndarray | float, float]]:
+        pressure_pa = seen.get(f"{self.name}.pressure_pa")
+        position_m = seen.get(f"{self.body}.position_m")
+        if pressure_pa is None or position_m is None:
+            return {}
+        filled_kg = self.filled_mass_kg(pressure_pa, position_m)
+        return {
+            "pressure_pa": (pressure_pa, 2e3),
+            "mass_kg": (filled_kg, 0.05 * float(np.median(filled_kg))),
+        }
 
     def derive(self, now: Conditions) -> dict[str, Expression]:
         own, body = now[self.name], now[self.body]

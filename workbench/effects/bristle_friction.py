@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import casadi as ca
+import numpy as np
 
 from workbench.effect import (
     Balance,
@@ -123,6 +124,13 @@ class BristleFriction(Effect):
 
     def states(self) -> Iterator[State]:
         yield State("deflection_m", initial=0.0, scale=2e-5, tolerance=1e-7)
+
+    def guess(self, seen: Mapping[str, np.ndarray]) -> dict[str, tuple[np.ndarray | float, float]]:
+        velocity_m_s = seen.get(f"{self.body}.velocity_m_s")
+        if velocity_m_s is None:
+            return {}
+        sliding_m = 0.7 * float(self.breakaway_deflection_m)  # g(v)/s0 between Stribeck and Coulomb
+        return {"deflection_m": (sliding_m * np.tanh(velocity_m_s / 5e-3), 0.5 * sliding_m)}
 
     def dry_force_n(self, velocity_m_s: Expression) -> Expression:
         """g(v): the dry force of steady sliding, positive."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import casadi as ca
@@ -82,6 +82,9 @@ class ValveLag(Effect):
 
     def states(self) -> Iterator[State]:
         yield State("lagged_v", initial=self.initial_v, scale=1.0, tolerance=1e-2)
+
+    def guess(self, seen: Mapping[str, np.ndarray]) -> dict[str, tuple[np.ndarray | float, float]]:
+        return {"lagged_v": (seen[self.signal], 0.1)} if self.signal in seen else {}
 
     def alter(self, signal: str, value: Expression, now: Conditions) -> Expression:
         if signal != self.signal:

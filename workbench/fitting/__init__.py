@@ -1,0 +1,1 @@
+"""Parameters from recordings: windows with free start states, priors, confidence."""

@@ -1,0 +1,241 @@
+"""Recordings cut into short windows whose start states are free, and the model run on all at once.
+
+Positions integrate: over a whole recording every small error of a flow or a force drifts away.
+Over windows of half a second forces and flows stay visible and drift is cut (diagnosis.md 1.1).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+
+from workbench.effect import Effect
+from workbench.plant import Plant
+from workbench.recording import Recording
+from workbench.simulation import inputs
+
+WINDOW_S = 0.5
+SMOOTHING_SAMPLES = 15  # of the parabola through recorded positions that gives speed at a start
+UNSEEN_PENALTY = 1e4  # residual in standard deviations of a sample that could not be simulated
+THREADS = 2
+
+
+@dataclass(frozen=True)
+class Windows:
+    """Windows of equal length out of one or more recordings.
+
+    Attributes
+    ----------
+    plant
+        The plant as it is fitted to the recordings: with their inputs and outputs.
+    recordings
+        What was cut.
+    firsts
+        For each recording the first sample of each of its windows.
+    length
+        Samples per window, L.
+    measured
+        Recorded outputs, shape (n_y, n_windows, L), NaN where missing.
+    noise
+        Standard deviation of each output, shape (n_y,).
+    start, start_deviation
+        Start states guessed from the recording and their standard deviations (n_x, n_windows).
+    """
+
+    plant: Plant
+    recordings: tuple[Recording, ...]
+    firsts: tuple[tuple[int, ...], ...]
+    length: int
+    measured: np.ndarray
+    noise: np.ndarray
+    start: np.ndarray
+    start_deviation: np.ndarray
+
+    def __len__(self) -> int:
+        return self.measured.shape[1]
+
+    @cached_property
+    def weight(self) -> np.ndarray:
+        """1 / noise where a sample was recorded, 0 where not; shape of ``measured``."""
+        return np.where(np.isnan(self.measured), 0.0, 1.0 / self.noise[:, None, None])
+
+    @property
+    def count(self) -> int:
+        """Number of recorded values."""
+        return int(np.count_nonzero(self.weight))
+
+    def with_plant(self, plant: Plant) -> Windows:
+        """The same windows for a plant with other effects; states it shares keep their start."""
+        start, deviation = _starts(plant, self.recordings, self.firsts)
+        ours, theirs = list(plant.state_list), list(self.plant.state_list)
+        for row, name in enumerate(ours):
+            if name in theirs:
+                start[row] = self.start[theirs.index(name)]
+        return replace(self, plant=plant, start=start, start_deviation=deviation)
+
+    def simulated(self, plants: Iterable[Plant], starts: np.ndarray) -> np.ndarray:
+        """Outputs of each plant over all windows, shape (n_plants, n_y, n_windows, L).
+
+        ``plants`` differ from the windows' plant in values only; ``starts`` has shape
+        (n_plants, n_x, n_windows) or (n_x, n_windows).
+        """
+        plants = list(plants)
+        starts = np.broadcast_to(starts, (len(plants), *self.start.shape))
+        fed = [self._inputs(plant) for plant in plants]
+        u, d = (np.hstack([each[k] for each in fed]) for k in (0, 1))
+        p = np.hstack([np.tile(plant.nominal[2][:, None], len(self)) for plant in plants])
+        x0 = np.hstack(list(starts)) if starts.shape[1] else np.zeros((0, p.shape[1]))
+        many = window_run(self.plant, self._sample_time_s, self.length)
+        y = many.map(p.shape[1], "thread", THREADS)(x0, u, d, p).full()
+        n_y, n = len(self.plant.measured), len(self)
+        return y.reshape(n_y, len(plants), n, self.length).transpose(1, 0, 2, 3)
+
+    def residuals(self, plants: Iterable[Plant], starts: np.ndarray) -> np.ndarray:
+        """Weighted residuals, measured minus simulated, shape (n_plants, n_y, n_windows, L)."""
+        error = np.nan_to_num(self.measured) - self.simulated(plants, starts)
+        weighted = np.where(self.weight > 0, error * self.weight, 0.0)
+        return np.nan_to_num(weighted, nan=UNSEEN_PENALTY, posinf=UNSEEN_PENALTY, neginf=-UNSEEN_PENALTY)
+
+    @property
+    def _sample_time_s(self) -> float:
+        return self.recordings[0].sample_time_s
+
+    def _inputs(self, plant: Plant) -> tuple[np.ndarray, np.ndarray]:
+        """Commands and measured inputs of all windows side by side, (n_u, n L) and (n_d, n L)."""
+        timing = tuple(m for m in plant.effects if not m.absent and type(m).resample is not Effect.resample)
+        if timing:
+            return _cut_inputs(plant, self.recordings, self.firsts, self.length)
+        return self._plain_inputs
+
+    @cached_property
+    def _plain_inputs(self) -> tuple[np.ndarray, np.ndarray]:
+        return _cut_inputs(self.plant.lean(), self.recordings, self.firsts, self.length)
+
+
+def cut_windows(
+    plant: Plant,
+    recordings: Iterable[Recording],
+    noise: Mapping[str, float],
+    window_s: float = WINDOW_S,
+) -> Windows:
+    """Cut recordings into windows, never across a gap; an incomplete last window is left out.
+
+    Raises
+    ------
+    ValueError
+        If no recording holds a whole window.
+    """
+    recordings = tuple(recordings)
+    length = max(round(window_s / recordings[0].sample_time_s), 2)
+    firsts = tuple(_firsts(recording, length) for recording in recordings)
+    if not any(firsts):
+        raise ValueError(f"no piece of the recordings is as long as one window of {window_s:g} s")
+    measured = np.concatenate(
+        [
+            _cut(recording.rows(plant.measured), own, length)
+            for recording, own in zip(recordings, firsts, strict=True)
+        ],
+        axis=1,
+    )
+    start, deviation = _starts(plant, recordings, firsts)
+    sigma = np.array([noise[name] for name in plant.measured])
+    return Windows(plant, recordings, firsts, length, measured, sigma, start, deviation)
+
+
+def window_run(plant: Plant, sample_time_s: float, length: int) -> ca.Function:
+    """(x0, u, d, p) -> outputs over one window; u, d of L columns, result (n_y, L)."""
+    model = plant.model
+    x0, u, d, p = (
+        ca.MX.sym(name, symbol.numel(), columns)
+        for name, symbol, columns in zip("xudp", model.symbols, (1, length, length, 1), strict=True)
+    )
+    x = x0
+    if model.states:
+        later = model.step(sample_time_s).mapaccum(length - 1)
+        columns = ca.repmat(p, 1, length - 1)
+        x = ca.horzcat(x0, later(x0, u[:, :-1], d[:, :-1], columns))
+    else:
+        x = ca.MX(0, length)
+    y = model.h.map(length)(x, u, d, ca.repmat(p, 1, length))
+    return ca.Function("window", [x0, u, d, p], [y])
+
+
+def _firsts(recording: Recording, length: int) -> tuple[int, ...]:
+    ends = (*recording.starts[1:], len(recording))
+    return tuple(
+        first
+        for start, end in zip(recording.starts, ends, strict=True)
+        for first in range(start, end - length + 1, length)
+    )
+
+
+def _cut(rows: np.ndarray, firsts: tuple[int, ...], length: int) -> np.ndarray:
+    """Rows (n, samples) cut into (n, n_windows, L)."""
+    return np.stack([rows[:, k : k + length] for k in firsts], axis=1) if firsts else np.zeros(
+        (rows.shape[0], 0, length)
+    )
+
+
+def _cut_inputs(
+    plant: Plant,
+    recordings: tuple[Recording, ...],
+    firsts: tuple[tuple[int, ...], ...],
+    length: int,
+) -> tuple[np.ndarray, np.ndarray]:
+    pairs = [inputs(plant, recording) for recording in recordings]
+    cut = (
+        np.concatenate(
+            [_cut(pair[k], own, length) for pair, own in zip(pairs, firsts, strict=True)], axis=1
+        )
+        for k in (0, 1)
+    )
+    u, d = (rows.reshape(rows.shape[0], -1) for rows in cut)
+    return u, d
+
+
+def _starts(
+    plant: Plant, recordings: tuple[Recording, ...], firsts: tuple[tuple[int, ...], ...]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Start states and their standard deviations, shapes (n_x, n_windows)."""
+    columns = [
+        guessed_states(plant, recording)[:, :, list(own)]
+        for recording, own in zip(recordings, firsts, strict=True)
+    ]
+    both = np.concatenate(columns, axis=2)
+    return both[0], both[1]
+
+
+def guessed_states(plant: Plant, recording: Recording) -> np.ndarray:
+    """States at every sample and their standard deviations from the recording, (2, n_x, n)."""
+    n = len(recording)
+    seen = dict(recording.channels)
+    for name in list(seen):
+        if name.endswith(".position_m") and name.replace("position_m", "velocity_m_s") not in seen:
+            speed = slope(seen[name], recording.sample_time_s, recording.starts)
+            seen[name.replace("position_m", "velocity_m_s")] = speed
+    rows = []
+    for member in plant.members:
+        guesses = member.guess(seen)
+        for state in member.states():
+            value, deviation = guesses.get(state.quantity, (float(state.initial), state.scale))
+            values = np.broadcast_to(np.asarray(value, dtype=float), (n,))
+            values = np.where(np.isfinite(values), values, float(state.initial))
+            rows.append(np.stack([values, np.full(n, deviation)]))
+    return np.stack(rows, axis=1) if rows else np.zeros((2, 0, n))
+
+
+def slope(values: np.ndarray, sample_time_s: float, starts: tuple[int, ...]) -> np.ndarray:
+    """Rate of a recorded channel by a moving parabola inside each piece, shape (n,)."""
+    from scipy.signal import savgol_filter
+
+    rate = np.zeros(len(values))
+    for first, last in zip(starts, (*starts[1:], len(values)), strict=True):
+        width = min(SMOOTHING_SAMPLES, (last - first - 1) // 2 * 2 + 1)
+        if width >= 3:
+            piece = np.nan_to_num(values[first:last])
+            rate[first:last] = savgol_filter(piece, width, 2, deriv=1, delta=sample_time_s)
+    return rate
