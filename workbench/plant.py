@@ -126,6 +126,10 @@ class Plant:
         effects = tuple(e for e in self.effects if e.name in kept or not e.absent)
         return replace(self, effects=effects)
 
+    def __getstate__(self) -> dict[str, Any]:
+        """All but the model, which another process builds again: its symbols do not travel."""
+        return {key: value for key, value in self.__dict__.items() if key != "model"}
+
     @property
     def members(self) -> tuple[Effect, ...]:
         """Parts, then effects."""

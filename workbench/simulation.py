@@ -70,5 +70,5 @@ def _run(
         return np.zeros((0, n))
     if n < 2:
         return x0[:, None]
-    later = plant.model.step(dt).mapaccum(n - 1)(x0, u[:, :-1], d[:, :-1], p).full()
+    later = plant.model.compiled_step(dt).mapaccum(n - 1)(x0, u[:, :-1], d[:, :-1], p).full()
     return np.hstack([x0[:, None], later])

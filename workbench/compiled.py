@@ -1,0 +1,109 @@
+"""CasADi functions as machine code where a C compiler is found, as they are where none is.
+
+Compile last: a compiled function has no derivatives and cannot be compiled into another one, so
+build everything from :meth:`workbench.model.Model.step` first, then compile the result.
+``map``, ``mapaccum`` and threads work on compiled functions as on any other, at full speed.
+
+The libraries are kept in the user's cache folder under the hash of their C code, the compiler and
+the flags.  ``CC`` names another compiler, ``WORKBENCH_NO_COMPILER=1`` forbids its use.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+import os
+import platform
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+from functools import cache
+from pathlib import Path
+
+import casadi as ca
+
+log = logging.getLogger("workbench")
+
+# No contraction to fused multiply-add: results stay equal to the last bit on every processor.
+# CasADi 3.8 copies empty inputs through an integer 0, which new compilers refuse by default.
+FLAGS = ("-O2", "-fPIC", "-shared", "-ffp-contract=off", "-w", "-Wno-int-conversion")
+COMPILERS = ("cc", "gcc", "clang")
+TIMEOUT_S = 120.0
+
+
+def compiled(function: ca.Function) -> ca.Function:
+    """The same function as machine code, equal to the last bit; itself where that cannot be had."""
+    compiler = _compiler(os.environ.get("CC", ""), os.environ.get("WORKBENCH_NO_COMPILER", ""))
+    if not compiler:
+        return function
+    try:
+        return ca.external(function.name(), str(_library(function, compiler)))
+    except (OSError, RuntimeError, subprocess.SubprocessError) as error:
+        reason = getattr(error, "stderr", None) or str(error)
+        log.warning("%s is not compiled: %s", function.name(), reason.strip()[:300])
+        return function
+
+
+@cache
+def _compiler(wanted: str, forbidden: str) -> tuple[str, ...]:
+    """The command of the C compiler; empty, and said once, where there is none."""
+    if forbidden not in ("", "0"):
+        log.info("WORKBENCH_NO_COMPILER is set: functions run in CasADi's virtual machine")
+        return ()
+    for command in (shlex.split(wanted), *([name] for name in COMPILERS)):
+        if command and shutil.which(command[0]):
+            return tuple(command)
+    log.info("no C compiler is found: functions run in CasADi's virtual machine, which is slower")
+    return ()
+
+
+def _library(function: ca.Function, compiler: tuple[str, ...]) -> Path:
+    """Path of the shared library, made unless it is there already."""
+    generator = ca.CodeGenerator(function.name())
+    generator.add(function)
+    code = generator.dump()
+    made_by = (_version(compiler), *compiler, *FLAGS, platform.machine())
+    key = hashlib.sha256("\n".join((*made_by, code)).encode()).hexdigest()[:32]
+    library = _folder() / f"{function.name()}_{key}.so"
+    if not library.exists():
+        _compile(code, library, compiler)
+    return library
+
+
+def _compile(code: str, library: Path, compiler: tuple[str, ...]) -> None:
+    """Compile aside and move into place, so that other processes never see half a library."""
+    strict = ("-Wl,-z,defs",) if sys.platform == "linux" else ()  # fail here, not at the first call
+    with tempfile.TemporaryDirectory(dir=library.parent) as aside:
+        source, made = Path(aside, "source.c"), Path(aside, library.name)
+        source.write_text(code, encoding="utf-8")
+        command = [*compiler, *FLAGS, *strict, str(source), "-o", str(made), "-lm"]
+        subprocess.run(command, capture_output=True, text=True, check=True, timeout=TIMEOUT_S)
+        os.replace(made, library)
+
+
+@cache
+def _version(compiler: tuple[str, ...]) -> str:
+    command = [*compiler, "--version"]
+    answer = subprocess.run(command, capture_output=True, text=True, check=True, timeout=TIMEOUT_S)
+    return answer.stdout
+
+
+@cache
+def _folder() -> Path:
+    """The user's cache folder; one that lasts as long as the process where that is read-only."""
+    try:
+        base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+        folder = Path(base, "workbench", "compiled")
+        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        with tempfile.TemporaryFile(dir=folder):
+            return folder
+    except (OSError, RuntimeError):  # no home at all is a RuntimeError
+        return Path(_kept(tempfile.TemporaryDirectory(prefix="workbench-")).name)
+
+
+@cache
+def _kept(folder: tempfile.TemporaryDirectory[str]) -> tempfile.TemporaryDirectory[str]:
+    """Held by the cache, so that the folder is removed only when the process ends."""
+    return folder
