@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
+from decimal import Decimal
 from functools import lru_cache
 from math import isfinite
 from typing import Any
@@ -103,6 +104,11 @@ class Scale:
     def to_si(self, number: Any) -> Any:
         return number * self.multiplier / self.divisor + self.offset
 
+    def exact(self, number: str) -> float:
+        """The SI value of a decimal number, rounded once: ``0.05 mm^2`` is 5e-8."""
+        product = Decimal(number) * Decimal(self.multiplier) / Decimal(self.divisor)
+        return float(product) + self.offset
+
     def from_si(self, value: Any) -> Any:
         return (value - self.offset) * self.divisor / self.multiplier
 
@@ -166,7 +172,7 @@ def quantity(text: Any, name: str, ambient_pa: float = STANDARD_ATMOSPHERE_PA) -
         If it is no number, has no unit, or one that is unknown or does not fit.
     """
     number, unit = split(text, name)
-    return float(scale(unit, name, ambient_pa).to_si(number))
+    return scale(unit, name, ambient_pa).exact(number)
 
 
 def deviation(text: Any, name: str, value: float) -> float:
@@ -177,24 +183,25 @@ def deviation(text: Any, name: str, value: float) -> float:
     UnitError
         As :func:`quantity`; also if it is negative, or relative to a value of zero.
     """
-    number, unit = split(text, name)
+    typed, unit = split(text, name)
+    number = float(typed)
     if not (isfinite(number) and number >= 0):
         raise UnitError(f"'{text}' is no standard deviation; expected a number from 0 on")
     if unit not in {"%", "percent"}:
-        return float(number * scale(unit, name).factor)
+        return replace(scale(unit, name), offset=0.0).exact(typed)
     if value == 0:
         raise UnitError(f"'{text}' of 0 says nothing; expected {_wanted(name) or 'a number'}")
     return abs(value) * number / 100.0
 
 
-def split(text: Any, name: str) -> tuple[float, str]:
-    """Number and unit of what a user typed; the unit is empty where none is needed."""
+def split(text: Any, name: str) -> tuple[str, str]:
+    """Number and unit of what a user typed, as text; no unit where none is needed."""
     if isinstance(text, bool) or not isinstance(text, int | float | str):
         raise UnitError(f"{text!r} is no quantity; expected {_example(name)}")
     found = _QUANTITY.fullmatch(str(text))
     if not found:
         raise UnitError(f"'{text}' does not start with a number; expected {_example(name)}")
-    number, unit = float(found[1]), found[2]
+    number, unit = found[1], found[2]
     if unit.startswith(","):
         raise UnitError(f"'{text}' has a comma; expected a decimal point")
     if not unit and si_unit(name):
@@ -209,11 +216,11 @@ def written(value: float, name: str) -> str:
     """
     if not display_unit(name):
         return repr(float(value))
-    unit, shown = display_unit(name), display_scale(name)
-    for digits in (6, 12, 15, 16, 17):
-        text = f"{shown.from_si(value):.{digits}g}"
-        if shown.to_si(float(text)) == value:
-            return f"{text} {unit}"
+    shown = display_scale(name)
+    number = Decimal(repr(float(value))) * Decimal(shown.divisor) / Decimal(shown.multiplier)
+    text = f"{number.normalize():f}" if 1e-4 <= abs(number) < 1e7 else f"{number.normalize():e}"
+    if shown.exact(text) == value:
+        return f"{text} {display_unit(name)}"
     return f"{float(value)!r} {si_unit(name)}"
 
 
