@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
-from decimal import Decimal
+from decimal import Context, Decimal
 from functools import lru_cache
 from math import isfinite
 from typing import Any
@@ -218,7 +218,8 @@ def written(value: float, name: str) -> str:
         return repr(float(value))
     shown = display_scale(name)
     number = Decimal(repr(float(value))) * Decimal(shown.divisor) / Decimal(shown.multiplier)
-    text = f"{number.normalize():f}" if 1e-4 <= abs(number) < 1e7 else f"{number.normalize():e}"
+    number = number.normalize(Context(prec=17))
+    text = f"{number:f}" if not number or 1e-4 <= abs(number) < 1e7 else f"{number:e}"
     if shown.exact(text) == value:
         return f"{text} {display_unit(name)}"
     return f"{float(value)!r} {si_unit(name)}"
