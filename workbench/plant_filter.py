@@ -1,0 +1,197 @@
+"""An extended Kalman filter on a plant, one sample as one CasADi function.
+
+Chosen state rates may carry an unknown input, modelled as a random walk:
+
+    dx/dt = f(x, u, d, p) + E w + process noise,     dw/dt = noise of the given intensity
+
+The transition matrix is not differentiated through the integrator.  It is the stability function
+of Radau IIA of order 3 at a quarter of the step, squared twice: L-stable, so that a bristle at
+-2e4 1/s is damped, and good to 1e-6 where the drive moves (40 rad/s at 5 ms).
+
+All matrices are in scaled states, X = (x / plant.scale, w / intensity).
+
+Source: Särkkä 2013, "Bayesian filtering and smoothing", algorithm 5.4; Hairer and Wanner,
+"Solving ordinary differential equations II", IV.3, for the stability function.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+
+from workbench.effect import Effect
+from workbench.effects.bristle_friction import BristleFriction
+from workbench.plant import Plant, require
+from workbench.rosenbrock import controlled_step
+
+SQUARINGS = 2
+
+
+def transition(A: ca.MX, step_s: float) -> ca.MX:
+    """exp(A h) by ((I + z/3) (I - 2z/3 + z^2/6)^-1)^4 with z = A h / 4."""
+    unit = ca.MX.eye(A.shape[0])
+    z = A * (step_s / 2**SQUARINGS)
+    F = ca.solve(unit - 2.0 / 3.0 * z + z @ z / 6.0, unit + z / 3.0)
+    for _ in range(SQUARINGS):
+        F = F @ F
+    return F
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlantFilter:
+    """An extended Kalman filter on a plant, with random-walk inputs on chosen state rates.
+
+    Attributes
+    ----------
+    sample_time_s, decimate
+        Inputs are held for ``sample_time_s``; one measurement is used every ``decimate`` samples.
+    measurement_noise
+        Standard deviation by output; every output of the plant needs one.
+    process_noise
+        Standard deviation that a state gains per square root of a second; others gain none.
+    unknown_inputs
+        Standard deviation that an unknown rate of a state gains per square root of a second.
+    initial_deviation
+        Standard deviation at the start by state, the plant's scale by default.
+    """
+
+    plant: Plant
+    sample_time_s: float
+    measurement_noise: Mapping[str, float]
+    process_noise: Mapping[str, float] = field(default_factory=dict)
+    unknown_inputs: Mapping[str, float] = field(default_factory=dict)
+    initial_deviation: Mapping[str, float] = field(default_factory=dict)
+    decimate: int = 1
+
+    def __post_init__(self) -> None:
+        states, who = self.plant.model.states, f"states of {self.plant.name}"
+        for group in (self.process_noise, self.unknown_inputs, self.initial_deviation):
+            require(group, states, who)
+        missing = [n for n in self.plant.measured if self.measurement_noise.get(n, 0.0) <= 0.0]
+        if missing:
+            raise ValueError(f"{self.plant.name}: no measurement noise for {', '.join(missing)}")
+        if min(self.unknown_inputs.values(), default=1.0) <= 0.0:
+            raise ValueError("an unknown input needs an intensity above zero")
+
+    @cached_property
+    def scale(self) -> np.ndarray:
+        """Unit of each entry of X, shape (n_x + n_w,)."""
+        return np.array([*self.plant.scale, *self.unknown_inputs.values()])
+
+    @cached_property
+    def start_covariance(self) -> np.ndarray:
+        """Covariance of X before the first measurement, shape (n_x + n_w, n_x + n_w)."""
+        n_w, states = len(self.unknown_inputs), self.plant.model.states
+        pairs = zip(states, self.plant.scale, strict=True)
+        deviation = [self.initial_deviation.get(name, size) / size for name, size in pairs]
+        return np.diag(np.array([*deviation, *[1.0] * n_w]) ** 2)
+
+    @cached_property
+    def predict(self) -> ca.Function:
+        """(X, P, u, d, p) -> (X, P, F) one step later; u and d have one column per sample."""
+        plant, model, h = self.plant, self.plant.model, self.sample_time_s * self.decimate
+        n, n_w = len(model.states), len(self.unknown_inputs)
+        X, P = ca.MX.sym("X", n + n_w), ca.MX.sym("P", n + n_w, n + n_w)
+        u = ca.MX.sym("u", len(model.commands), self.decimate)
+        d = ca.MX.sym("d", len(model.measured_inputs), self.decimate)
+        p = ca.MX.sym("p", len(model.parameters))
+        S, E = self.scale, self._entering
+        x, w = S[:n] * X[:n], S[n:] * X[n:]
+        A = model.jacobians(x, u[:, 0], d[:, 0], p)[0]
+        A = A * np.outer(1 / plant.scale, plant.scale)
+        coupling = E * np.outer(1 / plant.scale, S[n:])
+        F = transition(ca.blockcat([[A, coupling], [ca.MX(n_w, n), ca.MX(n_w, n_w)]]), h)
+        noise = [self.process_noise.get(name, 0.0) for name in model.states]
+        Q = ca.diag(np.array([*(noise / plant.scale), *[1.0] * n_w]) ** 2 * h / 2)
+        step = self._step
+        for k in range(self.decimate):
+            x = step(x, u[:, k], d[:, k], ca.vertcat(p, w))
+        later = ca.vertcat(x / plant.scale, X[n:])
+        P_later = F @ (P + Q) @ F.T + Q
+        return ca.Function("predict", [X, P, u, d, p], [later, P_later, F])
+
+    @cached_property
+    def correct(self) -> ca.Function:
+        """(X, P, u, d, p, y, received) -> (X, P, innovation, deviation, log-likelihood, i, J, L).
+
+        i = H' S^-1 e and J = H' S^-1 H are what the measurement says, L = I - K H what it leaves.
+
+        ``received`` is 1 or 0 by output; a missing value of y may hold any finite number.
+        """
+        model, n = self.plant.model, len(self.plant.scale)
+        size, n_y = len(self.scale), len(model.measured)
+        X, P = ca.MX.sym("X", size), ca.MX.sym("P", size, size)
+        u, d, p = (ca.MX.sym(k, s.numel()) for k, s in zip("udp", model.symbols[1:], strict=True))
+        y, received = ca.MX.sym("y", n_y), ca.MX.sym("received", n_y)
+        r = np.array([self.measurement_noise[name] for name in model.measured])
+        x = self.scale[:n] * X[:n]
+        expected, C = self._outputs(x, u, d, p)
+        C = C * np.outer(1 / r, self.scale[:n])  # outputs in units of their noise
+        H = ca.horzcat(C, ca.MX(n_y, size - n)) * ca.repmat(received, 1, size)
+        e = received * (y - expected) / r
+        S = H @ P @ H.T + ca.MX.eye(n_y)
+        K = self._corrected[:, None] * ca.solve(S, H @ P).T
+        rest = ca.MX.eye(size) - K @ H
+        weighted = ca.solve(S, ca.horzcat(e, H))
+        likely = -0.5 * (
+            e.T @ ca.solve(S, e) + ca.log(ca.det(S)) + ca.dot(received, np.log(2 * np.pi * r**2))
+        )
+        results = [X + K @ e, rest @ P @ rest.T + K @ K.T, e * r, ca.sqrt(ca.diag(S)) * r, likely]
+        results += [H.T @ weighted[:, 0], H.T @ weighted[:, 1:], rest]
+        return ca.Function("correct", [X, P, u, d, p, y, received], results)
+
+    @cached_property
+    def sample(self) -> ca.Function:
+        """One sample: correct what was predicted for it, then predict the next.
+
+        (X, P, u, d, p, y, received) with X and P predicted ->
+        (X and P predicted for the next sample, F, then what :attr:`correct` gives)
+        """
+        once = self.correct
+        columns = [once.size2_in(i) for i in range(once.n_in())]
+        columns[2:4] = self.decimate, self.decimate
+        symbols = [ca.MX.sym(f"i{i}", once.size1_in(i), m) for i, m in enumerate(columns)]
+        X, P, u, d, p, y, received = symbols
+        now = once(X, P, u[:, 0], d[:, 0], p, y, received)
+        following = self.predict(now[0], now[1], u, d, p)
+        return ca.Function("sample", [X, P, u, d, p, y, received], [*following, *now])
+
+    @cached_property
+    def _outputs(self) -> ca.Function:
+        """(x, u, d, p) -> (y, dy/dx)."""
+        model = self.plant.model
+        slope = ca.jacobian(model.outputs, model.symbols[0])
+        return ca.Function("outputs", [*model.symbols], [model.outputs, slope])
+
+    @property
+    def _entering(self) -> np.ndarray:
+        """E: which state rate each unknown input adds to, shape (n_x, n_w)."""
+        return np.array(
+            [[float(name == w) for w in self.unknown_inputs] for name in self.plant.model.states]
+        ).reshape(len(self.plant.scale), -1)
+
+    @property
+    def _corrected(self) -> np.ndarray:
+        """1 for what a measurement corrects, 0 for bristles, shape (n_x + n_w,)."""
+        bristles = [f"{m.name}.deflection_m" for m in self.plant.members if _slides(m)]
+        free = [float(name not in bristles) for name in self.plant.model.states]
+        return np.array([*free, *[1.0] * len(self.unknown_inputs)])
+
+    @cached_property
+    def _step(self) -> ca.Function:
+        """(x, u, d, (p, w)) -> x one sample later."""
+        model, dt = self.plant.model, self.sample_time_s
+        if not self.unknown_inputs:
+            return model.step(dt)
+        x, u, d, p = model.symbols
+        w = ca.SX.sym("w", len(self.unknown_inputs))
+        rates = model.rates + ca.DM(self._entering) @ w
+        return controlled_step((x, u, d, ca.vertcat(p, w)), rates, dt, model.tolerances)
+
+
+def _slides(member: Effect) -> bool:
+    return isinstance(member, BristleFriction)
