@@ -99,7 +99,7 @@ def test_stiction_holds_a_load_below_break_away_and_not_above():
 
 
 def test_open_loop_sine_gives_the_numbers_of_physics_7():
-    out = run(NOMINAL, sine(2600), substeps=25)
+    out = run(NOMINAL, sine(4000), substeps=25)
     position, velocity = out["position_m"], out["velocity_m_s"]
     assert position.min() == pytest.approx(0.012, abs=0.003)
     assert position.max() == pytest.approx(0.224, abs=0.010)

@@ -11,7 +11,7 @@ import numpy as np
 
 SAMPLES = 10_000
 START_M = 0.060
-LOW_M, HIGH_M = 0.035, 0.255
+LOW_M, HIGH_M = 0.038, 0.248
 TRAVEL_SPEED_M_S = 0.9
 
 
@@ -27,12 +27,12 @@ def validation_reference(rng: np.random.Generator) -> np.ndarray:
     slope = rng.uniform(0.04, 0.07)
     rise = START_M + slope * np.minimum(_time(2200), 2.2 - _time(2200)).clip(0)
     parts = [
-        np.full(600, START_M),
+        np.full(800, START_M),
         rise,
         np.full(600, rise[-1]),
         _move(rise[-1], rng.uniform(0.235, HIGH_M), 900),
     ]
-    parts.append(_sweep(rng, parts[-1][-1], 3800))
+    parts.append(_sweep(rng, parts[-1][-1], 3600))
     parts.append(_move(parts[-1][-1], rng.uniform(LOW_M, 0.08), 1000))
     last = parts[-1][-1]
     parts.append(last + rng.uniform(0.02, 0.05) * _time(SAMPLES - sum(map(len, parts))))
@@ -57,7 +57,7 @@ def _move(start: float, stop: float, samples: int, speed: float = TRAVEL_SPEED_M
 def _steps(rng: np.random.Generator, samples: int) -> np.ndarray:
     """Steps between random positions; the first two cross most of the stroke and rest long."""
     targets = [rng.uniform(0.23, HIGH_M), rng.uniform(LOW_M, 0.07)]
-    lengths = [1600, 1500]
+    lengths = [1700, 1600]
     while sum(lengths) < samples:
         far = targets[-1] + rng.choice([-1, 1]) * rng.uniform(0.02, 0.16)
         targets.append(far if LOW_M < far < HIGH_M else 0.29 - targets[-1])
