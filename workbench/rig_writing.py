@@ -1,0 +1,62 @@
+"""Writing a rig file that reads back to the same model, to the last bit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from workbench.errors import whole_file
+from workbench.plants import PLANTS
+from workbench.reading.format import default_format, format_lines
+from workbench.rig import ACCEPTED, Rig
+from workbench.rig_text import quoted
+from workbench.units import public_name, written
+
+
+def write_rig(rig: Rig, path: Path | str) -> None:
+    """The rig as a TOML file: what differs from the plant's own, and what is known of it.
+
+    Parameters with a standard deviation, such as fitted ones, are written with their value even
+    where that is the plant's own.  The file appears only once it is complete.
+    """
+    with whole_file(path) as unfinished:
+        unfinished.write_text(rig_text(rig), encoding="utf-8")
+
+
+def rig_text(rig: Rig) -> str:
+    """The text that :func:`write_rig` writes."""
+    lines = [ACCEPTED + " ".join(note.split()) for note in rig.notes]
+    lines += [""] if lines else []
+    lines += [f"name = {quoted(rig.name)}", f"plant = {quoted(rig.plant.name)}"]
+    if rig.removed or rig.added:
+        lines += ["", "[effects]"]
+        lines += [f"remove = {_list(rig.removed)}"] if rig.removed else []
+        lines += [f"add = {_list(rig.added)}"] if rig.added else []
+    lines += _section("values", {n: written(v, n) for n, v in _told(rig).items()})
+    lines += _section("uncertainty", {n: written(v, n) for n, v in rig.deviations.items()})
+    if rig.fixed:
+        lines += ["", "[fixed]", f"names = {_list(sorted(map(public_name, rig.fixed)))}"]
+    if rig.reader != default_format(PLANTS[rig.plant.name]()):
+        lines += ["", *format_lines(rig.reader)]
+    return "\n".join(lines) + "\n"
+
+
+def _told(rig: Rig) -> dict[str, float]:
+    """Values that the file must hold, by full name."""
+    own = PLANTS[rig.plant.name]()
+    absent = {own.candidates[name].strength for name in rig.removed}
+    return {
+        name: value
+        for name, value in rig.plant.values.items()
+        if name not in absent and (value != own.values[name] or name in rig.deviations)
+    }
+
+
+def _section(title: str, entries: dict[str, str]) -> list[str]:
+    if not entries:
+        return []
+    lines = (f"{quoted(public_name(name))} = {quoted(text)}" for name, text in entries.items())
+    return ["", f"[{title}]", *lines]
+
+
+def _list(names: tuple[str, ...] | list[str]) -> str:
+    return "[" + ", ".join(map(quoted, names)) + "]"
