@@ -1,0 +1,157 @@
+"""What a design model leaves out of its plant, and why: a written list, and the model itself.
+
+A controller is designed on fewer states than the plant has, because some of them are too fast to
+be controlled (a bristle at -2e4 1/s), change the force too little to be worth a gain (gas masses)
+or can be undone in the command (the dead zone).  Each is one :class:`LeftOut`, so the reduction
+can be printed, and undone one line at a time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+
+from workbench.effects.bristle_friction import BristleFriction
+from workbench.effects.supply_droop import SupplyDroop
+from workbench.effects.valve_command import CommandDelay, DeadZone
+from workbench.plant import Plant
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """One thing a design model does without: what, what takes its place, and the reason."""
+
+    what: str
+    instead: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class DesignModel:
+    """A plant with fewer states: x full = full(x), dx/dt and y = f(x, u).
+
+    Attributes
+    ----------
+    plant
+        The lean plant with the dead zone and the bristle at null; its commands are those behind
+        the dead zone.
+    states
+        Names of the states that are kept, in order.
+    left_out
+        What is not in it.
+    """
+
+    plant: Plant
+    states: tuple[str, ...]
+    left_out: tuple[LeftOut, ...]
+
+    @property
+    def commands(self) -> tuple[str, ...]:
+        return self.plant.model.commands
+
+    @property
+    def measured(self) -> tuple[str, ...]:
+        return self.plant.measured
+
+    @cached_property
+    def scale(self) -> np.ndarray:
+        """Typical size of each state, shape (n_x,)."""
+        sizes = {name: state.scale for name, state in self.plant.state_list.items()}
+        return np.array([sizes[name] for name in self.states])
+
+    @cached_property
+    def initial(self) -> np.ndarray:
+        """Initial value of the kept states, shape (n_x,)."""
+        values = dict(zip(self.plant.model.states, self.plant.initial, strict=True))
+        return np.array([values[name] for name in self.states])
+
+    @cached_property
+    def f(self) -> ca.Function:
+        """(x, u) -> (dx/dt, y), x the kept states."""
+        return ca.Function("design", [*self._symbols], [*self._expressions])
+
+    @cached_property
+    def jacobians(self) -> ca.Function:
+        """(x, u) -> (A, B, C, D)."""
+        blocks = [ca.jacobian(e, s) for e in self._expressions for s in self._symbols]
+        return ca.Function("jacobians", [*self._symbols], blocks)
+
+    @cached_property
+    def full(self) -> ca.Function:
+        """Kept states -> state of the plant."""
+        return ca.Function("full", [self._symbols[0]], [self._substituted[0]])
+
+    @property
+    def _symbols(self) -> tuple[ca.SX, ca.SX]:
+        x, u = self.plant.model.symbols[:2]
+        kept = [x[self.plant.model.states.index(name)] for name in self.states]
+        return ca.vertcat(*kept), u
+
+    @cached_property
+    def _substituted(self) -> tuple[ca.SX, ca.SX, ca.SX]:
+        """State, rates and outputs of the plant in terms of the kept states and numbers."""
+        model = self.plant.model
+        x, _, d, p = model.symbols
+        _, d_nominal, p_nominal = self.plant.nominal
+        inside = [name for name in model.states if name not in self.states]
+        old = ca.vertcat(*(x[model.states.index(name)] for name in inside), ca.SX(0, 1))
+        new = ca.vertcat(*(_stand_in(self.plant, name) for name in inside), ca.SX(0, 1))
+        reduced = ca.substitute([x, model.rates, model.outputs], [old], [new])
+        return tuple(ca.substitute(reduced, [d, p], [ca.DM(d_nominal), ca.DM(p_nominal)]))
+
+    @cached_property
+    def _expressions(self) -> tuple[ca.SX, ca.SX]:
+        _, rates, outputs = self._substituted
+        rows = [self.plant.model.states.index(name) for name in self.states]
+        return rates[rows], outputs
+
+
+def design_model(plant: Plant) -> DesignModel:
+    """The plant without gas masses, bristle, dead zone and droop of the supply."""
+    lean = plant.lean()
+    nulls = {f"{m.name}.half_width_v": 0.0 for m in lean.effects if isinstance(m, DeadZone)} | {
+        f"{m.name}.presliding_share": 0.0 for m in lean.effects if isinstance(m, BristleFriction)
+    }
+    design = lean.with_values(nulls)
+    kept = tuple(name for name in design.model.states if not _passed_over(design, name))
+    return DesignModel(design, kept, tuple(_left_out(lean)))
+
+
+def _passed_over(plant: Plant, state: str) -> bool:
+    member, _, quantity = state.rpartition(".")
+    owner = next(m for m in plant.members if m.name == member)
+    return quantity == "mass_kg" or isinstance(owner, BristleFriction | SupplyDroop)
+
+
+def _stand_in(plant: Plant, state: str) -> ca.SX:
+    """What takes the place of a state: gas at supply temperature, a bristle and a droop of zero."""
+    member, _, quantity = state.rpartition(".")
+    if quantity != "mass_kg":
+        return ca.SX(0.0)
+    gas = plant.model.conditions[member]
+    room_k = plant.model.conditions["supply"].temperature_k
+    return gas.pressure_pa * gas.volume_m3 / (gas.gas_constant_j_kg_k * room_k)
+
+
+def _left_out(plant: Plant) -> Iterator[LeftOut]:
+    for name in plant.model.states:
+        if name.endswith(".mass_kg"):
+            room = "gas at supply temperature (level 3 of physics.md 1.2)"
+            yield LeftOut(name, room, "temperature moves the flow by a few per cent only")
+    for member in plant.effects:
+        if isinstance(member, DeadZone):
+            band = "undone in the command"
+            yield LeftOut(member.name, band, "a band without slope has no linear model")
+        elif isinstance(member, BristleFriction):
+            steady = "its steady value for the direction of sliding, constant in the drift"
+            yield LeftOut(f"{member.name} bristle", steady, "a pole near -2e4 1/s ruins a design")
+        elif isinstance(member, SupplyDroop):
+            yield LeftOut(
+                member.name, "supply at its nominal pressure", "slow and outside the loop"
+            )
+        elif isinstance(member, CommandDelay):
+            yield LeftOut(member.name, "no delay", "acts on samples; the margins must hold it")
