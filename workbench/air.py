@@ -43,9 +43,9 @@ def nozzle_function(ratio: Expression) -> Expression:
     k = HEAT_CAPACITY_RATIO
     at_choking = CRITICAL_RATIO ** (1.0 / k) * sqrt(1.0 - CRITICAL_RATIO ** ((k - 1.0) / k))
     bounded = ca.fmin(ca.fmax(ratio, CRITICAL_RATIO), LAMINAR_RATIO)
-    cooled = bounded ** ((k - 1.0) / k)
+    cooled = ca.exp((k - 1.0) / k * ca.log(bounded))  # a power whose slope costs no second one
     subsonic = bounded / cooled * ca.sqrt(1.0 - cooled) / at_choking  # r^(1/k) = r / r^((k-1)/k)
-    above = ca.fmin(ca.fmax((1.0 - ratio) / (1.0 - LAMINAR_RATIO), 0.0), 1.0)
+    above = ca.fmin((1.0 - ratio) / (1.0 - LAMINAR_RATIO), 1.0)
     return subsonic * above
 
 
@@ -67,7 +67,7 @@ def iso_function(
     b, a = critical_ratio, cracking_ratio
     regular = ca.fmin(LAMINAR_RATIO * a, a - 1e-4)
     bounded = ca.fmin(ca.fmax(ratio, b), regular)
-    subsonic = (1.0 - ((bounded - b) / (a - b)) ** 2) ** subsonic_index
+    subsonic = ca.exp(subsonic_index * ca.log(1.0 - ((bounded - b) / (a - b)) ** 2))
     return subsonic * ca.fmin(ca.fmax((a - ratio) / (a - regular), 0.0), 1.0)
 
 
@@ -117,20 +117,19 @@ class Path:
     @cached_property
     def temperature_k(self) -> Expression:
         """Temperature of the gas that flows: that of the upstream end."""
-        return ca.if_else(self.forward, self.above_k, self.below_k)
+        return self.below_k + ca.if_else(self.forward, self.above_k - self.below_k, 0.0)
 
     @cached_property
     def ratio(self) -> Expression:
-        """Downstream over upstream pressure, in [0, 1]."""
-        lower_pa = ca.fmin(self.above_pa, self.below_pa)
-        return ca.fmin(ca.fmax(lower_pa / self._upstream_pa, 0.0), 1.0)
+        """Downstream over upstream pressure, at most 1; negative only where no gas can be."""
+        return ca.fmin(self.above_pa, self.below_pa) / self._upstream_pa
 
     @cached_property
     def choked_kg_s_m2(self) -> Expression:
         """Signed choked mass flow per effective area: C_chk p_u / sqrt(T_u)."""
-        root = ca.sqrt(ca.fmax(self.temperature_k, LOWEST_TEMPERATURE_K))
-        size = choked_constant(self.gas_constant_j_kg_k) * self._upstream_pa / root
-        return ca.if_else(self.forward, size, -size)
+        direction = 2.0 * self.forward - 1.0
+        size = choked_constant(self.gas_constant_j_kg_k) * self._upstream_pa
+        return direction * size / ca.sqrt(self.temperature_k)
 
     @cached_property
     def _upstream_pa(self) -> Expression:
@@ -141,7 +140,7 @@ class Path:
 
         mdot = A_e C_chk p_u/sqrt(T_u) psi(p_d/p_u).  Source: physics.md 1.1.
         """
-        return area_m2 * self.choked_kg_s_m2 * law(self.ratio)
+        return area_m2 * law(self.ratio) * self.choked_kg_s_m2
 
 
 def path_between(

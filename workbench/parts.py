@@ -93,7 +93,7 @@ class Body(Part):
     initial_position_m: float = 0.0
 
     def states(self) -> Iterator[State]:
-        yield State("position_m", self.initial_position_m, scale=0.1, tolerance=2e-6)
+        yield State("position_m", self.initial_position_m, scale=0.1, tolerance=2e-8)
         yield State("velocity_m_s", initial=0.0, scale=1.0, tolerance=2e-3)
 
     def guess(self, seen: Mapping[str, np.ndarray]) -> dict[str, tuple[np.ndarray | float, float]]:

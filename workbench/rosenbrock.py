@@ -11,13 +11,16 @@ One step in the form of Hairer and Wanner, "Solving ordinary differential equati
 
     (I / (h gamma) - J) k_i = f(x + sum_j a_ij k_j) + sum_j c_ij k_j / h,   x1 = x + sum m_i k_i
 
-A sample is first done in :data:`COARSE` steps.  Where the embedded error exceeds the tolerance of
-some state, or a value is not finite, the sample is done again in finer steps, at most the last
-level of :data:`LEVELS`.  Only the level that is needed is evaluated (a CasADi switch), and the
-choice depends on the start of the sample alone, so a run is reproducible sample by sample.
+A sample is divided into steps of at most :data:`COARSEST_STEP_S`.  Where the embedded error of a
+step exceeds the tolerances, or is not a number, the step is done again as :data:`FINER` steps, each
+checked in the same way, down to :data:`LEVELS` levels; the last level is taken as it comes.  Only
+what is needed is evaluated (a CasADi switch), and the choice depends on the start of the step
+alone, so a run is reproducible sample by sample.
 
 The elimination is written out without pivoting.  That is safe here because the diagonal of
 I / (h gamma) - J dominates for small h, and it keeps the structural zeros of J.
+
+Errors and speed are printed by ``pytest tests/benchmarks -s --benchmark-enable``.
 """
 
 from __future__ import annotations
@@ -28,8 +31,9 @@ import casadi as ca
 import numpy as np
 
 GAMMA = 0.5
-COARSEST_STEP_S = 0.5e-3
-LEVELS = (1, 4, 16, 64)  # steps per COARSEST_STEP_S
+COARSEST_STEP_S = 1e-3
+FINER = 4
+LEVELS = 4  # steps of 1, 1/4, 1/16 and 1/64 of the coarse one
 
 
 def controlled_step(
@@ -37,77 +41,86 @@ def controlled_step(
 ) -> ca.Function:
     """(x, u, d, p) -> x one sample later, inputs held.
 
-    ``symbols`` are the columns x, u, d, p; ``tolerances``, shape (n_x,), is the error of one
-    coarse step that each state may make before the sample is done again in finer steps.
+    ``symbols`` are the columns x, u, d, p; ``tolerances``, shape (n_x,), is the error of one step
+    above which it is done again in finer steps (root of the sum of squares of error / tolerance).
     """
-    one = single_step(symbols, rates)
-    coarse = max(ceil(sample_time_s / COARSEST_STEP_S - 1e-9), 1)
     x, u, d, p = (ca.MX.sym(k, s.numel()) for k, s in zip("xudp", symbols, strict=True))
-    levels = [_repeated(one, sample_time_s, coarse * finer, tolerances) for finer in LEVELS]
-    result = levels[-1]
-    for level in reversed(levels[:-1]):
-        result = _refined(level, result)
-    x_next, _ = result(x, u, d, p)
+    trial = _trial(symbols, rates, tolerances)
+    advance = _last(trial)
+    for _ in range(LEVELS - 1):
+        advance = _refined(trial, advance)
+    steps = max(ceil(sample_time_s / COARSEST_STEP_S - 1e-9), 1)
+    x_next = _times(advance, steps, x, ca.vertcat(u, d, p), sample_time_s / steps)
     return ca.Function("step", [x, u, d, p], [x_next], [*"xudp"], ["x_next"])
+
+
+def _trial(symbols: tuple[ca.SX, ...], rates: ca.SX, tolerances: np.ndarray) -> ca.Function:
+    """(x, held, h) -> (x after h seconds, true where the error passes); held is (u, d, p)."""
+    x, *inputs = symbols
+    held, h = ca.SX.sym("held", sum(s.numel() for s in inputs)), ca.SX.sym("h")
+    ends = np.cumsum([0, *(s.numel() for s in inputs)]).tolist()
+    later, error = single_step(symbols, rates)(x, *ca.vertsplit(held, ends), h)
+    passes = ca.sumsqr(error / tolerances) < 1.0  # false, too, where it is not a number
+    return ca.Function("trial", [x, held, h], [later, passes])
+
+
+def _last(trial: ca.Function) -> ca.Function:
+    """(x, held, h) -> x after one step, whatever its error."""
+    x, held, h = (ca.MX.sym(k, trial.numel_in(i)) for i, k in enumerate(("x", "held", "h")))
+    return ca.Function("last", [x, held, h], [trial(x, held, h)[0]])
+
+
+def _refined(trial: ca.Function, finer: ca.Function) -> ca.Function:
+    """(x, held, h) -> x after one step where its error passes, else after several finer ones."""
+    x, held, h = (ca.MX.sym(k, trial.numel_in(i)) for i, k in enumerate(("x", "held", "h")))
+    found = ca.MX.sym("found", x.numel())
+    keep = ca.Function("keep", [found, x, held, h], [found])
+    again = ca.Function("again", [found, x, held, h], [_times(finer, FINER, x, held, h / FINER)])
+    later, passes = trial(x, held, h)
+    chosen = ca.Function.if_else("chosen", keep, again)(passes, later, x, held, h)
+    return ca.Function("refined", [x, held, h], [chosen])
+
+
+def _times(advance: ca.Function, n: int, x: ca.MX, held: ca.MX, h: ca.MX | float) -> ca.MX:
+    """X after n steps of h seconds each."""
+    return advance.fold(n)(x, ca.repmat(held, 1, n), ca.repmat(ca.MX(h), 1, n))
 
 
 def single_step(symbols: tuple[ca.SX, ...], rates: ca.SX) -> ca.Function:
     """(x, u, d, p, h) -> (x after h seconds, error of the embedded method), one RODAS3 step."""
     x, u, d, p = symbols
-    h, n = ca.SX.sym("h"), x.numel()
-    f = ca.Function("f", [x, u, d, p], [rates])
-    W = ca.SX.eye(n) / (GAMMA * h) - ca.jacobian(rates, x)
-    lower, upper = _factorised(W)
+    h = ca.SX.sym("h")
+    f, per_s = ca.Function("f", [x, u, d, p], [rates]), 1.0 / h
+    W = ca.SX.eye(x.numel()) * (per_s / GAMMA) - ca.jacobian(rates, x)
+    lower, upper, inverse = _factorised(W)
 
-    k1 = _solved(lower, upper, rates)
-    k2 = _solved(lower, upper, rates + 4.0 / h * k1)
-    k3 = _solved(lower, upper, f(x + 2.0 * k1, u, d, p) + (k1 - k2) / h)
+    def solved(right: ca.SX) -> ca.SX:
+        return _solved(lower, upper, inverse, right)
+
+    k1 = solved(rates)
+    k2 = solved(rates + 4.0 * per_s * k1)
+    k3 = solved(f(x + 2.0 * k1, u, d, p) + per_s * (k1 - k2))
     before = x + 2.0 * k1 + k3
-    k4 = _solved(lower, upper, f(before, u, d, p) + (k1 - k2 - 8.0 / 3.0 * k3) / h)
+    k4 = solved(f(before, u, d, p) + per_s * (k1 - k2 - 8.0 / 3.0 * k3))
     return ca.Function("single", [x, u, d, p, h], ca.cse([before + k4, k4]))
 
 
-def _repeated(one: ca.Function, sample_time_s: float, steps: int, tolerances: np.ndarray):
-    """(x, u, d, p) -> (x one sample later, largest error over tolerance) in equal steps."""
-    x, u, d, p = (ca.MX.sym(k, one.numel_in(i)) for i, k in enumerate("xudp"))
-    carried, n = ca.MX.sym("carried", x.numel() + 1), x.numel()
-    following, error = one(carried[:n], u, d, p, sample_time_s / steps)
-    size = ca.mmax(ca.fabs(error) / tolerances)
-    size = ca.if_else(size < np.inf, size, np.inf)  # a NaN compares false, and counts as too large
-    result = ca.vertcat(following, ca.fmax(carried[n], size))
-    many = ca.Function("fold", [carried, u, d, p], [result]).expand().fold(steps)
-    columns = (ca.repmat(v, 1, steps) for v in (u, d, p))
-    end = many(ca.vertcat(x, 0.0), *columns)
-    return ca.Function(f"in_{steps}", [x, u, d, p], [end[:n], end[n]])
-
-
-def _refined(level: ca.Function, finer: ca.Function) -> ca.Function:
-    """The level where its error passes, else the finer one; only one of both is finished."""
-    x, u, d, p = (ca.MX.sym(k, level.numel_in(i)) for i, k in enumerate("xudp"))
-    found, size = ca.MX.sym("found", x.numel()), ca.MX.sym("size")
-    keep = ca.Function("keep", [x, u, d, p, found, size], [found, size])
-    again = ca.Function("again", [x, u, d, p, found, size], [*finer(x, u, d, p)])
-    chosen = ca.Function.if_else("chosen", keep, again)
-    x_next, worst = level(x, u, d, p)
-    results = chosen(worst < 1.0, x, u, d, p, x_next, worst)
-    return ca.Function("refined", [x, u, d, p], [*results])
-
-
-def _factorised(W: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Unit lower and upper triangle of W by elimination without pivoting, zeros kept."""
+def _factorised(W: ca.SX) -> tuple[ca.SX, ca.SX, list[ca.SX]]:
+    """Unit lower and upper triangle of W, zeros kept, and one over each pivot; no pivoting."""
     n = W.shape[0]
-    lower, upper = ca.SX.eye(n), ca.SX(W)
+    lower, upper, inverse = ca.SX.eye(n), ca.SX(W), []
     for k in range(n):
+        inverse.append(1.0 / upper[k, k])
         for i in range(k + 1, n):
             if not upper.sparsity().has_nz(i, k):
                 continue
-            factor = upper[i, k] / upper[k, k]
+            factor = upper[i, k] * inverse[k]
             lower[i, k] = factor
             upper[i, k:] = ca.sparsify(upper[i, k:] - factor * upper[k, k:])
-    return ca.sparsify(lower), ca.sparsify(ca.triu(upper))
+    return ca.sparsify(lower), ca.sparsify(ca.triu(upper)), inverse
 
 
-def _solved(lower: ca.SX, upper: ca.SX, right: ca.SX) -> ca.SX:
+def _solved(lower: ca.SX, upper: ca.SX, inverse: list[ca.SX], right: ca.SX) -> ca.SX:
     """Solution of L U k = right."""
     n = lower.shape[0]
     y: list[ca.SX] = []
@@ -117,5 +130,5 @@ def _solved(lower: ca.SX, upper: ca.SX, right: ca.SX) -> ca.SX:
     k: list[ca.SX] = [ca.SX(0)] * n
     for i in reversed(range(n)):
         known = [upper[i, j] * k[j] for j in range(i + 1, n) if upper.sparsity().has_nz(i, j)]
-        k[i] = (y[i] - sum(known)) / upper[i, i]
+        k[i] = (y[i] - sum(known)) * inverse[i]
     return ca.vertcat(ca.SX(0, 1), *k)

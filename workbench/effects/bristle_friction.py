@@ -123,7 +123,7 @@ class BristleFriction(Effect):
     excess_weight: Expression = form(1.0, upper=5.0)
 
     def states(self) -> Iterator[State]:
-        yield State("deflection_m", initial=0.0, scale=2e-5, tolerance=1e-7)
+        yield State("deflection_m", initial=0.0, scale=2e-5, tolerance=1e-8)
 
     def guess(self, seen: Mapping[str, np.ndarray]) -> dict[str, tuple[np.ndarray | float, float]]:
         velocity_m_s = seen.get(f"{self.body}.velocity_m_s")

@@ -116,4 +116,5 @@ class FivePortValve(Effect):
 
     def _flow_kg_s(self, path: Path, area_m2: Expression, law: FlowLaw) -> Expression:
         """Flow through the controlled hole and through the closed-centre leak beside it."""
-        return path.flow_kg_s(area_m2, law) + path.flow_kg_s(self.leak_area_m2, NozzleLaw())
+        holes_m2 = area_m2 * law(path.ratio) + self.leak_area_m2 * NozzleLaw()(path.ratio)
+        return holes_m2 * path.choked_kg_s_m2
