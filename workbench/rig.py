@@ -12,8 +12,8 @@ from workbench.effects import CATALOGUE
 from workbench.errors import InputError, Message, listed
 from workbench.plant import Plant
 from workbench.plants import PLANTS
-from workbench.reading.format import RecordingFormat, default_format, read_format
 from workbench.recording import Recording
+from workbench.recording_format import RecordingFormat, default_format, read_format
 from workbench.rig_text import RigText, read_text
 from workbench.units import (
     STANDARD_ATMOSPHERE_PA,

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from workbench.errors import whole_file
 from workbench.plants import PLANTS
-from workbench.reading.format import default_format, format_lines
+from workbench.recording_format import default_format, format_lines
 from workbench.rig import ACCEPTED, Rig
 from workbench.rig_text import quoted
 from workbench.units import public_name, written

@@ -1,10 +1,7 @@
 """Recordings from files: CSV and MAT become channels in SI units on one uniform time grid."""
 
-from workbench.reading.format import ChannelFormat, RecordingFormat, TimeFormat, default_format
+from workbench.reading.reader import read_recording
+from workbench.reading.table import RecordingWarning
+from workbench.reading.writer import write_recording
 
-__all__ = [
-    "ChannelFormat",
-    "RecordingFormat",
-    "TimeFormat",
-    "default_format",
-]
+__all__ = ["RecordingWarning", "read_recording", "write_recording"]

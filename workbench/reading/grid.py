@@ -1,0 +1,157 @@
+"""One uniform time grid: small jitter is interpolated, gaps are refused or cut."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from workbench.errors import InputError, Message
+from workbench.reading.table import RecordingWarning
+
+LONGEST_STEP = 2.5  # of the usual time between samples; beyond that it is a gap
+EXACT = 0.02  # of a sample: closer to the grid than this needs no interpolation
+CLOCK = 0.6  # of a sample: a clock this close to even ticks evenly, its stamps are rounded
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Sample times of gap-free pieces; ``grid_s`` is None where the samples already lie on it."""
+
+    time_s: np.ndarray
+    sample_time_s: float
+    pieces: tuple[slice, ...]
+    grids_s: tuple[np.ndarray, ...] | None
+
+    @property
+    def starts(self) -> tuple[int, ...]:
+        """First sample of each piece on the grid."""
+        lengths = (
+            [len(grid) for grid in self.grids_s]
+            if self.grids_s
+            else [piece.stop - piece.start for piece in self.pieces]
+        )
+        return tuple(int(n) for n in np.cumsum([0, *lengths[:-1]]))
+
+    def on(self, values: np.ndarray) -> np.ndarray:
+        """A channel on the grid, shape (n,): between samples a line; on/off signals are held."""
+        if self.grids_s is None:
+            return np.concatenate([values[piece] for piece in self.pieces])
+        finite = values[np.isfinite(values)]
+        switched = len(finite) and np.isin(finite, [finite.min(), finite.max()]).all()
+        place = _held if switched else np.interp
+        return np.concatenate(
+            [
+                place(grid, self.time_s[piece], values[piece])
+                for grid, piece in zip(self.grids_s, self.pieces, strict=True)
+            ]
+        )
+
+
+def uniform_grid(
+    time_s: np.ndarray,
+    place: Callable[[int], str],
+    file: str,
+    *,
+    gaps: str = "refuse",
+    resample_s: float | None = None,
+    least: int = 2,
+) -> Grid:
+    """The grid for these sample times, shape (n,).
+
+    The step is the usual time between samples, or ``resample_s``.  With ``gaps="split"`` the
+    recording is cut at every gap; pieces of fewer than ``least`` samples are left out.
+
+    Raises
+    ------
+    InputError
+        If time is missing, runs backwards, stands still or has a gap, with the place.
+    """
+    _require_forward(time_s, place, file)
+    steps = np.diff(time_s)
+    usual = float(np.median(steps))
+    gap = np.flatnonzero(steps > LONGEST_STEP * usual)
+    if len(gap) and gaps == "refuse":
+        worst = gap[np.argmax(steps[gap])]
+        what = (
+            f"{len(gap)} gap{'s' * (len(gap) > 1)} in the time, the longest {steps[worst]:.4g} s "
+            f"after {place(worst)} (t = {time_s[worst]:.6g} s)"
+        )
+        expected = f'a sample every {usual:.4g} s, or gaps = "split" in [recording]'
+        raise InputError(Message(what, "time", expected, file=file))
+    edges = [0, *(gap + 1), len(time_s)]
+    pieces = tuple(slice(int(a), int(b)) for a, b in pairwise(edges))
+    step, exact = _step(time_s, pieces, usual, resample_s)
+    grids = [_points(time_s[piece], step) for piece in pieces]
+    kept = [i for i, grid in enumerate(grids) if len(grid) >= least]
+    if not kept:
+        what = f"no piece without a gap has {least} samples"
+        raise InputError(Message(what, "time", file=file))
+    if len(kept) < len(pieces):
+        warnings.warn(
+            f"{file}: {len(pieces) - len(kept)} pieces between gaps are too short and left out",
+            RecordingWarning,
+            stacklevel=2,
+        )
+    chosen = tuple(pieces[i] for i in kept)
+    return Grid(time_s, step, chosen, None if exact else tuple(grids[i] for i in kept))
+
+
+def _require_forward(time_s: np.ndarray, place: Callable[[int], str], file: str) -> None:
+    if len(time_s) < 2:
+        raise InputError(Message(f"{len(time_s)} sample is no recording", file=file))
+    if not np.isfinite(time_s).all():
+        at = place(int(np.argmin(np.isfinite(time_s))))
+        raise InputError(Message(f"no time at {at}", "time", file=file))
+    steps = np.diff(time_s)
+    if (steps <= 0).any():
+        row = int(np.argmax(steps <= 0))
+        how = "stands still" if steps[row] == 0 else "runs backwards"
+        what = f"time {how} at {place(row + 1)}: {time_s[row + 1]:.6g} s after {time_s[row]:.6g} s"
+        raise InputError(Message(what, "time", file=file))
+
+
+def _step(
+    time_s: np.ndarray, pieces: tuple[slice, ...], usual: float, resample_s: float | None
+) -> tuple[float, bool]:
+    """Time between samples, and whether they lie on that grid already."""
+    longest = max(pieces, key=lambda piece: piece.stop - piece.start)
+    t = time_s[longest]
+    even = (t[-1] - t[0]) / max(len(t) - 1, 1) or usual
+    off = np.abs(t - t[0] - even * np.arange(len(t))).max() / even
+    step = resample_s or _tidy(even if off < CLOCK else usual, len(t))
+    return step, all(_fits(time_s[piece], step) for piece in pieces)
+
+
+def _fits(t: np.ndarray, step: float) -> bool:
+    return bool(np.abs(t - t[0] - step * np.arange(len(t))).max() < EXACT * step)
+
+
+def _tidy(step: float, n: int) -> float:
+    """The step with few digits, where that moves no sample by a noticeable part of a step."""
+    for digits in (1, 2, 3, 4, 6, 9):
+        short = float(f"{step:.{digits}g}")
+        if abs(short - step) * n < EXACT * step:
+            return short
+    return step
+
+
+def _points(t: np.ndarray, step: float) -> np.ndarray:
+    return t[0] + step * np.arange(int((t[-1] - t[0]) / step + EXACT) + 1)
+
+
+def _held(grid: np.ndarray, time_s: np.ndarray, values: np.ndarray) -> np.ndarray:
+    return values[np.clip(np.searchsorted(time_s, grid, side="right") - 1, 0, None)]
+
+
+def missing_stretch(values: Mapping[str, np.ndarray], name: str) -> tuple[int, int] | None:
+    """First row and length of the first stretch of NaN in a channel, if there is one."""
+    missing = ~np.isfinite(values[name])
+    if not missing.any():
+        return None
+    first = int(missing.argmax())
+    present = np.flatnonzero(~missing[first:])
+    return first, int(present[0]) if len(present) else len(missing) - first

@@ -1,0 +1,98 @@
+"""Whether numbers can be what a rig file says they are: units, stuck and saturated sensors."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+
+import numpy as np
+
+from workbench.errors import Message
+from workbench.plant import Plant
+from workbench.reading.table import RecordingWarning
+from workbench.units import display_unit, public_name, scale, si_unit, suffix
+
+LIMITS = {
+    # suffix: least that the largest value must reach, the largest it may have, both in SI
+    "pa": (1e3, 1.2e7),
+    "m": (0.0, 20.0),
+    "m_s": (0.0, 200.0),
+    "rad": (0.0, 30.0),
+    "n": (0.0, 1e6),
+    "k": (100.0, 2e3),
+}
+USUAL = {
+    # suffix: the range of ordinary values in SI, and the units in which people log them
+    "pa": (5e4, 3e6, ("bar", "kPa", "psi", "mbar", "MPa", "Pa")),
+    "m": (1e-3, 3.0, ("mm", "cm", "um", "m")),
+    "m_s": (1e-3, 10.0, ("mm/s", "m/s")),
+    "rad": (1e-2, 12.0, ("deg", "rad", "mrad")),
+    "v": (1e-2, 12.0, ("mV", "V")),
+    "n": (0.1, 2e4, ("N", "kN", "mN")),
+    "k": (230.0, 600.0, ("K", "degC")),
+}
+BEYOND = 1.5  # of the range of a command: more cannot be that command
+RUN = 50  # equal values in a row that make a sensor suspect, where it usually changes
+LIVELY = 0.2  # share of unchanged samples below which a channel usually changes
+
+
+def cannot_be(
+    name: str, raw: np.ndarray, si: np.ndarray, unit: str, plant: Plant, file: str
+) -> Message | None:
+    """What makes these values impossible in their unit, with the unit they look like."""
+    low, high = float(np.nanmin(si)), float(np.nanmax(si))
+    least, most = LIMITS.get(suffix(name), (0.0, np.inf))
+    for signal in plant.commands:
+        if signal.name == name and np.isfinite(signal.upper):
+            most = BEYOND * max(abs(signal.upper), abs(signal.lower))
+    kind = public_name(name)
+    size = max(abs(low), abs(high))
+    if si_unit(name) == "Pa" and low < -100.0 and size >= least:
+        what = f"an absolute pressure of {low / 1e5:.3g} bar cannot be"
+        plain = unit.removesuffix("_gauge")
+        return Message(what, kind, f"'{plain}_gauge' if it counts from ambient", file=file)
+    if least <= size <= most:
+        return None
+    seen = f"values between {np.nanmin(raw):.4g} and {np.nanmax(raw):.4g}"
+    other = _looks_like(name, raw, unit)
+    hint = f" look like {other}" if other else f" cannot be in {unit or 'this channel'}"
+    return Message(seen + hint, kind, f"another unit than '{unit}'", file=file)
+
+
+def _looks_like(name: str, raw: np.ndarray, unit: str) -> str:
+    """The first usual unit in which these values would be ordinary."""
+    smallest, largest, units = USUAL.get(suffix(name), (0.0, 0.0, ()))
+    for other in units:
+        top = abs(scale(other, name).to_si(np.nanmax(np.abs(raw))))
+        if other != unit and smallest <= top <= largest:
+            return other
+    return ""
+
+
+def warn_of_sensors(channels: Mapping[str, np.ndarray], outputs: set[str], file: str) -> None:
+    """Warn of sensors that stand still, or sit at the end of their range, for a while."""
+    for name in outputs & channels.keys():
+        values = channels[name]
+        same = np.diff(values) == 0
+        length, first = _longest_run(same)
+        rest = np.delete(same, slice(first, first + length)) if length else same
+        if length < RUN or not len(rest) or rest.mean() > LIVELY:
+            continue
+        at_end = values[first] in (np.nanmin(values), np.nanmax(values))
+        shown = scale(display_unit(name), name).from_si(values[first])
+        warnings.warn(
+            f"{file}: {public_name(name)}: {'saturated' if at_end else 'stuck'} at "
+            f"{shown:.5g} {display_unit(name)} for {length + 1} samples from sample {first + 1} on",
+            RecordingWarning,
+            stacklevel=3,
+        )
+
+
+def _longest_run(same: np.ndarray) -> tuple[int, int]:
+    """Length and first index of the longest run of True."""
+    edges = np.diff(np.concatenate([[0], same.astype(int), [0]]))
+    first, last = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    if not len(first):
+        return 0, 0
+    longest = int(np.argmax(last - first))
+    return int(last[longest] - first[longest]), int(first[longest])

@@ -1,0 +1,153 @@
+"""A recording from a file, read as its rig says."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+
+from workbench.differentiator import WINDOW, derivative
+from workbench.errors import InputError, Message, listed
+from workbench.plant import Plant
+from workbench.reading.grid import Grid, missing_stretch, uniform_grid
+from workbench.reading.matlab import matlab_table
+from workbench.reading.plausible import cannot_be, warn_of_sensors
+from workbench.reading.table import RecordingWarning, Table
+from workbench.reading.text_table import text_table
+from workbench.recording import Recording
+from workbench.recording_format import derived_channels
+from workbench.rig import Rig
+from workbench.units import public_name, scale
+
+
+def read_recording(rig: Rig, path: Path | str) -> Recording:
+    """The channels of a file in SI units, by full name, on one uniform time grid.
+
+    Velocities that the plant wants as measured inputs, and the file lacks, are derived from the
+    position.  Doubtful sensors give a :class:`RecordingWarning`.
+
+    Raises
+    ------
+    InputError
+        With everything that is wrong with the file, each with its place.
+    """
+    path = Path(path)
+    table = matlab_table(path) if path.suffix.lower() == ".mat" else text_table(path, rig.reader)
+    columns = _columns(rig, table)
+    numbers = sorted(set(columns.values()))
+    raw = dict(zip(numbers, table.load(numbers), strict=True))
+    time_s = _time(rig, table, raw, columns)
+    values = {name: raw[number] for name, number in columns.items() if name != "time"}
+    channels = _in_si(rig, table, values)
+    derived = {k: v for k, v in derived_channels(rig.plant).items() if k not in channels}
+    grid = uniform_grid(
+        time_s,
+        table.place,
+        table.file,
+        gaps=rig.reader.gaps,
+        resample_s=rig.reader.resample_s,
+        least=WINDOW if derived else 2,
+    )
+    channels = {name: grid.on(values) for name, values in channels.items()}
+    for velocity, position in derived.items():
+        channels[velocity] = derivative(channels[position], grid.sample_time_s, grid.starts)
+    outputs = set(rig.plant.measured + rig.plant.optional_outputs)
+    warn_of_sensors(channels, outputs, table.file)
+    return _recording(rig, path, channels, grid)
+
+
+def _recording(rig: Rig, path: Path, channels: dict[str, np.ndarray], grid: Grid) -> Recording:
+    noise = {
+        name: channel.noise
+        for name, channel in rig.reader.channels.items()
+        if channel.noise is not None and name in channels
+    }
+    found = Recording(
+        name=path.stem,
+        sample_time_s=grid.sample_time_s,
+        channels=channels,
+        noise=noise,
+        starts=grid.starts,
+        source=str(path),
+    )
+    free = [n for n in rig.plant.values if rig.standard_deviation(n) > 0 and n not in rig.fixed]
+    if len(found) < len(free):
+        what = f"{len(found)} samples are fewer than the {len(free)} parameters of {rig.plant.name}"
+        raise InputError(Message(what, file=str(path)))
+    return found
+
+
+def _columns(rig: Rig, table: Table) -> dict[str, int]:
+    """Column numbers from 0 by full channel name, and of ``time``; optional ones may be missing."""
+    reader = rig.reader
+    wanted = {name: (c.column, c.optional) for name, c in reader.channels.items()}
+    found: dict[str, int] = {}
+    wrong: list[Message] = []
+    named = {column for column, _ in wanted.values()}
+    for name, (column, optional) in wanted.items():
+        number = table.find(column, public_name(name))
+        if isinstance(number, int):
+            found[name] = number
+        elif not optional:
+            wrong.append(number)
+        elif number.nearest and number.nearest not in named:
+            warnings.warn(f"{number}; left out", RecordingWarning, stacklevel=4)
+    if not found:
+        what = f"none of the columns of {rig.name} ({rig.plant.name}) is in this file"
+        expected = listed(column for column, _ in wanted.values())
+        if table.names:
+            expected += f" among its columns {listed(table.names)}"
+        hint = "; is it a recording of another plant?"
+        raise InputError(Message(what + hint, expected=expected, file=table.file))
+    if reader.time.step_s is None:
+        number = table.find(reader.time.column or "time", "time")
+        if isinstance(number, int):
+            found["time"] = number
+        else:
+            wrong.insert(0, number)
+    if wrong:
+        raise InputError(*wrong)
+    return found
+
+
+def _time(
+    rig: Rig, table: Table, raw: dict[int, np.ndarray], columns: dict[str, int]
+) -> np.ndarray:
+    reader = rig.reader.time
+    if reader.step_s is not None:
+        return reader.step_s * np.arange(len(next(iter(raw.values()))))
+    return scale(reader.unit, "time_s").to_si(raw[columns["time"]])
+
+
+def _in_si(rig: Rig, table: Table, raw: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Channels in SI, still on the file's own times; refuses what cannot be."""
+    plant, found, wrong = rig.plant, {}, []
+    for name, values in raw.items():
+        unit = rig.reader.channels[name].unit
+        found[name] = scale(unit, name, rig.ambient_pa).to_si(values)
+        said = _missing(plant, table, found, name)
+        if said is None and np.isfinite(values).any():
+            said = cannot_be(name, values, found[name], unit, plant, table.file)
+        if said is None and name in plant.measured and np.nanmin(values) == np.nanmax(values):
+            what = f"is {values[0]:.6g} {unit} in all {len(values)} samples".replace("  ", " ")
+            said = Message(what, public_name(name), "a sensor that moves", file=table.file)
+        wrong += [said] if said else []
+    if wrong:
+        raise InputError(*wrong)
+    return found
+
+
+def _missing(plant: Plant, table: Table, found: dict[str, np.ndarray], name: str) -> Message | None:
+    """What is wrong with the missing samples of a channel: an input must be complete."""
+    stretch = missing_stretch(found, name)
+    if stretch is None:
+        return None
+    first, length = stretch
+    kind = public_name(name)
+    if length == len(found[name]):
+        return Message("has no samples at all", kind, file=table.file)
+    if name in plant.measured or name in plant.optional_outputs:
+        return None
+    what = f"{length} samples are missing from {table.place(first)} on"
+    return Message(what, kind, "an input without missing samples", file=table.file)

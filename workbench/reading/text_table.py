@@ -1,0 +1,169 @@
+"""Columns of a text file: any separator, decimal comma or point, with or without names and units.
+
+The numbers are read in one go by numpy; only a file it refuses is gone through cell by cell.
+"""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import re
+import warnings
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from workbench.errors import InputError, Message
+from workbench.reading.table import RecordingWarning, Table, open_bytes
+from workbench.recording_format import RecordingFormat
+
+NUMBER = re.compile(r"[-+]?(?:[\d.,']*\d[\d.,']*(?:[eE][-+]?\d+)?|nan|inf)", re.IGNORECASE)
+COMMA_NUMBER = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?|[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
+MISSING = {"", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--"}
+LOOKED_AT = 50  # lines that decide on separator and decimal sign
+
+
+def text_table(path: Path, reader: RecordingFormat) -> Table:
+    """The columns of a text file, as ``reader`` says or as the file shows.
+
+    Raises
+    ------
+    InputError
+        If it holds no rows of numbers, or numbers where names were expected.
+    """
+    file, lines = str(path), decoded(open_bytes(path)).splitlines()
+    rows = [
+        (number, line)
+        for number, line in enumerate(lines, start=1)
+        if number > reader.skip and line.strip()
+    ]
+    comments = [row for row in rows if row[1].lstrip()[0] in "#%"]
+    rows = [row for row in rows if row[1].lstrip()[0] not in "#%"] if comments else rows
+    if not rows:
+        raise InputError(Message(f"no rows after the first {reader.skip}", file=file))
+    if reader.header and comments and _numeric(rows[0][1]):
+        before = [row for row in comments if row[0] < rows[0][0]]
+        rows = [(n, line.lstrip("#% ")) for n, line in before[-1:]] + rows
+    head = rows[0] if reader.header else None
+    data = rows[1:] if head else rows
+    if head and _numeric(head[1]):
+        what = "the first row holds numbers, not the names of columns"
+        raise InputError(Message(what, expected="header = false", file=file, line=head[0]))
+    if head and data and not any(_numeric(word) for word in re.split(r"[;,\t| ]+", data[0][1])):
+        data = data[1:]  # the row of units
+    if not data:
+        raise InputError(Message("there are names of columns but no rows of numbers", file=file))
+    sample = [line for _, line in data[:LOOKED_AT]]
+    separator = reader.separator or find_separator(sample)
+    numbers = np.fromiter((n for n, _ in data), int, len(data))
+    body = plain_numbers([line for _, line in data], separator, reader)
+    names = _names(head[1], separator) if head else []
+    n_columns = max(len(names), len(_cells(body[0], separator)))
+    load = partial(_load, body=body, separator=separator, file=file, numbers=numbers)
+    return Table(file, names, n_columns, load, lambda row: f"line {numbers[row]}")
+
+
+def decoded(content: bytes) -> str:
+    """Text in the encodings that loggers and spreadsheets write."""
+    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return content.decode("utf-16", errors="replace")
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return content.decode("latin-1")
+
+
+def find_separator(lines: Sequence[str]) -> str:
+    """The character between the cells of these rows; a space stands for any white space."""
+    for separator in "\t;|":
+        if all(separator in line for line in lines):
+            return separator
+    words = [line.split() for line in lines]
+    if all(len(w) > 1 and all(COMMA_NUMBER.fullmatch(c) for c in w) for w in words):
+        return " "
+    return "," if all("," in line for line in lines) else " "
+
+
+def find_decimal(lines: Sequence[str], separator: str) -> str:
+    """The decimal sign of these rows: the last of point and comma in a number that has both."""
+    if separator == ",":
+        return "."
+    cells = [cell for line in lines for cell in _cells(line, separator)]
+    both = [cell for cell in cells if "," in cell and "." in cell]
+    if both:
+        return max(",.", key=both[0].rfind)
+    return "," if any("," in cell for cell in cells) else "."
+
+
+def plain_numbers(lines: list[str], separator: str, reader: RecordingFormat) -> list[str]:
+    """The rows with a decimal point and without signs between thousands."""
+    decimal = reader.decimal or find_decimal(lines[:LOOKED_AT], separator)
+    thousands = reader.thousands
+    if decimal == "." and thousands is None:
+        return lines
+    text = "\n".join(lines)
+    if thousands and thousands == decimal:  # the last one in a number is the decimal sign
+        text = re.sub(rf"(?<=\d){re.escape(thousands)}(?=\d+{re.escape(thousands)})", "", text)
+    elif thousands:
+        text = re.sub(rf"(?<=\d){re.escape(thousands)}(?=\d)", "", text)
+    if decimal != ".":
+        text = text.replace(decimal, ".")
+    return text.split("\n")
+
+
+def _numeric(text: str) -> bool:
+    """True when the first cell of a row is a number."""
+    words = re.split(r"[;\t| ]+", text.strip().strip('"'))
+    return bool(words[0]) and bool(NUMBER.fullmatch(words[0].rstrip(",")))
+
+
+def _cells(line: str, separator: str) -> list[str]:
+    if separator == " ":
+        return line.split()
+    if '"' in line:
+        return [c.strip() for c in next(csv.reader([line], delimiter=separator))]
+    return [cell.strip() for cell in line.split(separator)]
+
+
+def _names(line: str, separator: str) -> list[str]:
+    if separator == " " and re.search(r"\s{2,}|\t", line.strip()):
+        return [name.strip(" \"'") for name in re.split(r"\s{2,}|\t", line.strip())]
+    return [name.strip(" \"'") for name in _cells(line, separator)]
+
+
+def _load(
+    wanted: Sequence[int], body: list[str], separator: str, file: str, numbers: np.ndarray
+) -> np.ndarray:
+    delimiter = None if separator == " " else separator
+    try:
+        found = np.loadtxt(body, delimiter=delimiter, usecols=wanted, ndmin=2, comments=None)
+    except ValueError:
+        return _cell_by_cell(wanted, body, separator, file, numbers)
+    return found.T
+
+
+def _cell_by_cell(
+    wanted: Sequence[int], body: list[str], separator: str, file: str, numbers: np.ndarray
+) -> np.ndarray:
+    """The columns with NaN where a cell is empty or says so; names the first that is no number."""
+    found = np.full((len(wanted), len(body)), np.nan)
+    for row, line in enumerate(body):
+        cells, place = _cells(line, separator), int(numbers[row])
+        if len(cells) <= max(wanted):
+            if row == len(body) - 1:
+                warnings.warn(f"{file}:{place}: unfinished row left out", RecordingWarning, 2)
+                return found[:, :-1]
+            what = f"this row has {len(cells)} columns"
+            expected = f"at least {max(wanted) + 1}"
+            raise InputError(Message(what, expected=expected, file=file, line=place))
+        for i, column in enumerate(wanted):
+            if cells[column].lower() in MISSING:
+                continue
+            try:
+                found[i, row] = float(cells[column])
+            except ValueError:
+                what = f"'{cells[column]}' in column {column + 1} is not a number"
+                raise InputError(Message(what, file=file, line=place)) from None
+    return found
