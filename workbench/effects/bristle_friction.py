@@ -23,7 +23,7 @@ from workbench.effect import (
 
 BREAKAWAY_SHARE = 0.9  # z_ba = 0.9 z_max, paper 002
 NEGLIGIBLE_FORCE_N = 1e-6  # keeps 0/0 away where all dry friction is absent
-LEAST_DEFLECTION = 1e-3  # of the break-away deflection: stiction without Coulomb friction at speed
+LEAST_DEFLECTION = 0.1  # of the break-away deflection: stiction without Coulomb friction at speed
 
 
 def blend(deflection: Expression, velocity: Expression, limit: Expression) -> Expression:
@@ -52,7 +52,8 @@ class BristleFriction(Effect):
     F_ex = F_S - F_C is the excess of static friction.  The bristle's stiffness follows from the
     static force, s0 = (F_C + F_ex) / z_b with z_b the break-away deflection, and its damping from
     the stiffness, s1 = s0 tau: so it stays well behaved when Coulomb friction goes to zero, and
-    paper 002's s0 = 1.12e6 N/m, s1 = 50 N s/m come out with its forces.  e is ``asymmetry``, w the
+    paper 002's s0 = 1.12e6 N/m, s1 = 50 N s/m come out with its forces.  Below a tenth of the static
+    force (stiction without Coulomb friction, at speed) the limit of z stays and the force fades.  e is ``asymmetry``, w the
     weight of each coefficient.
 
     Source: paper 002 Eqs. 9 to 14 and Table 5 (F5; erratum E002-6: magnitudes for v < 0), paper
@@ -146,7 +147,10 @@ class BristleFriction(Effect):
     def terms(self, now: Conditions) -> Iterator[Force]:
         velocity_m_s, z = now[self.body].velocity_m_s, now[self.name].deflection_m
         plain_n = self.dry_force_n(velocity_m_s) * ca.tanh(self.steepness_s_m * velocity_m_s)
-        bristle_n = self._stiffness_n_m * (z + self.bristle_time_s * self._rate(velocity_m_s, z))
+        relative, limit = self._relative(velocity_m_s)
+        weakened = relative / limit  # 1 but where the least deflection takes over
+        rate = self._rate(velocity_m_s, z)
+        bristle_n = self._stiffness_n_m * (weakened * z + self.bristle_time_s * rate)
         dry_n = plain_n + self.presliding_share * (bristle_n - plain_n)
         yield Force(self.body, -dry_n - self.viscous_force_n(velocity_m_s))
 
@@ -163,8 +167,12 @@ class BristleFriction(Effect):
         dry_n = self.coulomb_force_n + self.stiction_excess_n
         return dry_n / self.breakaway_deflection_m
 
-    def _rate(self, velocity_m_s: Expression, z: Expression) -> Expression:
+    def _relative(self, velocity_m_s: Expression) -> tuple[Expression, Expression]:
+        """g(v) / F_S, and the same kept above the least deflection."""
         relative = (self.dry_force_n(velocity_m_s) + NEGLIGIBLE_FORCE_N) / self._static_force_n
-        limit_m = self.breakaway_deflection_m * ca.fmax(relative, LEAST_DEFLECTION)
+        return relative, ca.fmax(relative, LEAST_DEFLECTION)
+
+    def _rate(self, velocity_m_s: Expression, z: Expression) -> Expression:
+        limit_m = self.breakaway_deflection_m * self._relative(velocity_m_s)[1]
         plastic = blend(z, velocity_m_s, limit_m) * ca.fabs(velocity_m_s) * z / limit_m
         return velocity_m_s - plastic

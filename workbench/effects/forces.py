@@ -129,7 +129,7 @@ class EndStops(Effect):
     """
 
     body: str
-    stiffness_n_m: Expression = strength(typical=2e6)
+    stiffness_n_m: Expression = strength(typical=2e6, relative_deviation=0.0)
     damping_n_s_m: Expression = form(2e3)
     lower_m: Expression = form(0.0, lower=-10.0, upper=10.0)
     upper_m: Expression = form(0.1, lower=-10.0, upper=10.0)

@@ -1,7 +1,16 @@
 """Recordings cut into short windows whose start states are free, and the model run on all at once.
 
 Positions integrate: over a whole recording every small error of a flow or a force drifts away.
-Over windows of half a second forces and flows stay visible and drift is cut (diagnosis.md 1.1).
+Over short windows forces and flows stay visible and drift is cut (diagnosis.md 1.1).  A tenth of a
+second is two or three pressure time constants of a servo drive; where the slide sticks, longer
+windows run across break-aways and are far from linear in anything (diagnosis.md 4.5).
+
+Residuals are divided by a *scale* per output and window.  Sensor noise alone is a poor one: with a
+5 um position sensor a 1 mm error of a model outweighs every pressure.  So the scale is the noise or
+the model's own typical error in that output, whichever is larger, times the square root of the
+correlation time of that error in samples: 10 000 correlated samples are worth a few hundred, and
+counted in full they would push every parameter out of its prior.  Windows that are far worse than
+the typical one (a break-away at the wrong instant) count less (Huber's weights).
 """
 
 from __future__ import annotations
@@ -18,9 +27,10 @@ from workbench.plant import Plant
 from workbench.recording import Recording
 from workbench.simulation import inputs
 
-WINDOW_S = 0.5
+WINDOW_S = 0.1
 SMOOTHING_SAMPLES = 15  # of the parabola through recorded positions that gives speed at a start
-UNSEEN_PENALTY = 1e4  # residual in standard deviations of a sample that could not be simulated
+UNSEEN_PENALTY = 1e3  # residual in standard deviations of a sample that could not be simulated
+OUTLYING = 3.0  # windows worse than this many typical errors count less
 THREADS = 2
 
 
@@ -41,7 +51,9 @@ class Windows:
     measured
         Recorded outputs, shape (n_y, n_windows, L), NaN where missing.
     noise
-        Standard deviation of each output, shape (n_y,).
+        Standard deviation of the noise of each output, shape (n_y,).
+    scale
+        What residuals are divided by, shape (n_y, n_windows).
     start, start_deviation
         Start states guessed from the recording and their standard deviations (n_x, n_windows).
     """
@@ -52,6 +64,7 @@ class Windows:
     length: int
     measured: np.ndarray
     noise: np.ndarray
+    scale: np.ndarray
     start: np.ndarray
     start_deviation: np.ndarray
 
@@ -60,13 +73,29 @@ class Windows:
 
     @cached_property
     def weight(self) -> np.ndarray:
-        """1 / noise where a sample was recorded, 0 where not; shape of ``measured``."""
-        return np.where(np.isnan(self.measured), 0.0, 1.0 / self.noise[:, None, None])
+        """1 / scale where a sample was recorded, 0 where not; shape of ``measured``."""
+        return np.where(np.isnan(self.measured), 0.0, 1.0 / self.scale[:, :, None])
 
     @property
     def count(self) -> int:
         """Number of recorded values."""
         return int(np.count_nonzero(self.weight))
+
+    def rescaled(self, residual: np.ndarray) -> Windows:
+        """The same windows with scales from weighted residuals (n_y, n_windows, L) of a model."""
+        recorded = np.maximum((self.weight > 0).sum(axis=2), 1)
+        squares = (residual**2).sum(axis=2)
+        size = self.scale * np.sqrt(squares / recorded)
+        typical = np.maximum(np.median(size, axis=1), self.noise)[:, None]
+        excess = np.maximum(size / (OUTLYING * typical), 1.0)
+        correlated = np.median(residual.sum(axis=2) ** 2 / np.maximum(squares, 1e-300), axis=1)
+        samples = np.clip(correlated, 1.0, self.length)[:, None]
+        return replace(self, scale=typical * np.sqrt(excess * samples))
+
+    def scaled_like(self, other: Windows) -> Windows:
+        """The same windows with the typical scales of others: a held-out recording's yardstick."""
+        typical = other.scale.min(axis=1, keepdims=True)
+        return replace(self, scale=np.broadcast_to(typical, self.scale.shape).copy())
 
     def with_plant(self, plant: Plant) -> Windows:
         """The same windows for a plant with other effects; states it shares keep their start."""
@@ -89,8 +118,7 @@ class Windows:
         u, d = (np.hstack([each[k] for each in fed]) for k in (0, 1))
         p = np.hstack([np.tile(plant.nominal[2][:, None], len(self)) for plant in plants])
         x0 = np.hstack(list(starts)) if starts.shape[1] else np.zeros((0, p.shape[1]))
-        many = window_run(self.plant, self._sample_time_s, self.length)
-        y = many.map(p.shape[1], "thread", THREADS)(x0, u, d, p).full()
+        y = self._run.map(p.shape[1], "thread", THREADS)(x0, u, d, p).full()
         n_y, n = len(self.plant.measured), len(self)
         return y.reshape(n_y, len(plants), n, self.length).transpose(1, 0, 2, 3)
 
@@ -100,9 +128,9 @@ class Windows:
         weighted = np.where(self.weight > 0, error * self.weight, 0.0)
         return np.nan_to_num(weighted, nan=UNSEEN_PENALTY, posinf=UNSEEN_PENALTY, neginf=-UNSEEN_PENALTY)
 
-    @property
-    def _sample_time_s(self) -> float:
-        return self.recordings[0].sample_time_s
+    @cached_property
+    def _run(self) -> ca.Function:
+        return window_run(self.plant, self.recordings[0].sample_time_s, self.length)
 
     def _inputs(self, plant: Plant) -> tuple[np.ndarray, np.ndarray]:
         """Commands and measured inputs of all windows side by side, (n_u, n L) and (n_d, n L)."""
@@ -143,7 +171,8 @@ def cut_windows(
     )
     start, deviation = _starts(plant, recordings, firsts)
     sigma = np.array([noise[name] for name in plant.measured])
-    return Windows(plant, recordings, firsts, length, measured, sigma, start, deviation)
+    scale = np.tile(sigma[:, None], (1, measured.shape[1]))
+    return Windows(plant, recordings, firsts, length, measured, sigma, scale, start, deviation)
 
 
 def window_run(plant: Plant, sample_time_s: float, length: int) -> ca.Function:
@@ -155,7 +184,7 @@ def window_run(plant: Plant, sample_time_s: float, length: int) -> ca.Function:
     )
     x = x0
     if model.states:
-        later = model.step(sample_time_s).mapaccum(length - 1)
+        later = model.compiled_step(sample_time_s).mapaccum(length - 1)
         columns = ca.repmat(p, 1, length - 1)
         x = ca.horzcat(x0, later(x0, u[:, :-1], d[:, :-1], columns))
     else:

@@ -1,0 +1,1 @@
+"""Which physical effect is missing: where it acts, which one it is, and whether to believe it."""

@@ -1,0 +1,214 @@
+"""The projected profile scan: what each effect of the catalogue would explain, without a refit.
+
+At a fitted point let r be the weighted residual, J_x and J_p its derivatives in the start states
+and in the fitted parameters (with their priors).  What the nuisances cannot explain of a vector is
+measured by
+
+    P = I - Q_x Q_x',   J~ = P J_p,   A = (J~'J~ + Lambda)^-1,   M = P - J~ A J~'
+
+For sizes m of effect j the plant is simulated again, r_j(m), and
+
+    c_j(m) = r_j' M r_j  (with the prior's offset kept),   drop_j = c(0) - min_m c_j(m)
+
+This is exact in the effect and linear only in the nuisances.  It needs no derivative in the
+effect, so kinks and singular nulls do not matter, and a scan over shapes is the supremum over them
+(Davies 1977, 1987).  Its smallest size is Rao's score test, the modification index of structural
+equation modelling.
+
+Source: diagnosis.md 1.4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from workbench.fitting.gauss_newton import Linearised, Point, linearise, normal_equations
+from workbench.fitting.unknowns import Unknowns
+from workbench.fitting.windows import Windows
+from workbench.plant import Candidate, Plant
+
+LARGEST_STEP = 6.0  # prior deviations a nuisance may move in one linear step
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One size, and shape, of one candidate.
+
+    values      parameter values that put the candidate into the plant
+    drop        fall of the projected cost against the model without it
+    nuisance    linear step of the scaled unknowns that goes with it, shape (n_p,)
+    """
+
+    candidate: Candidate
+    values: Mapping[str, float]
+    drop: float
+    nuisance: np.ndarray
+
+
+@dataclass(frozen=True)
+class Profile:
+    """The scan of one candidate: all trials, best first, and its direction.
+
+    signature       what it does to the residual that nothing else can, (rows,)
+    compensation    share of its effect that the fitted parameters can imitate, R^2
+    """
+
+    candidate: Candidate
+    trials: tuple[Trial, ...]
+    signature: np.ndarray
+    compensation: float
+
+    @property
+    def drop(self) -> float:
+        """Fall of the projected cost at the best size; 0 where no size helps."""
+        return max(self.trials[0].drop, 0.0)
+
+
+@dataclass(frozen=True)
+class Metric:
+    """The nuisance-free metric M at a fitted point; see the module's docstring."""
+
+    at: Linearised
+    unknowns: Unknowns
+    hessian: np.ndarray
+    gradient: np.ndarray
+    residual: np.ndarray
+    derivatives: np.ndarray
+
+    @property
+    def cost(self) -> float:
+        """c(0): the projected cost of the model as it is."""
+        return self._value(self.residual, self.gradient)
+
+    def rows(self, residuals: np.ndarray) -> np.ndarray:
+        """Residuals (n, n_y, n_windows, L) as projected rows, shape (n, n_windows, rows)."""
+        n, n_y, n_w, length = residuals.shape
+        flat = residuals.transpose(2, 1, 3, 0).reshape(n_w, n_y * length, n)
+        away = self.at.residual[:, n_y * length :, None]
+        full = np.concatenate([flat, np.repeat(away, n, axis=2)], axis=1)
+        return self.at.projected(full).transpose(2, 0, 1)
+
+    def explained(self, row: np.ndarray) -> tuple[float, np.ndarray]:
+        """(cost, linear step of the scaled unknowns) for projected rows (n_windows, rows)."""
+        flat = self.derivatives.reshape(-1, self.derivatives.shape[2])
+        gradient = flat.T @ row.ravel() + self.unknowns.precision * self.at.point.t
+        step = -np.linalg.solve(self.hessian, gradient) if len(gradient) else gradient
+        return self._value(row, gradient), np.clip(step, -LARGEST_STEP, LARGEST_STEP)
+
+    def signature(self, row: np.ndarray) -> tuple[np.ndarray, float]:
+        """(what the nuisances cannot imitate of a change, share of it that they can)."""
+        flat = self.derivatives.reshape(-1, self.derivatives.shape[2])
+        change = row.ravel()
+        if not flat.shape[1]:
+            return change, 0.0
+        left = change - flat @ np.linalg.solve(self.hessian, flat.T @ change)
+        whole = float(change @ change)
+        share = 1.0 - float(change @ left) / whole if whole > 0 else 1.0
+        return left, float(np.clip(share, 0.0, 1.0))
+
+    def _value(self, row: np.ndarray, gradient: np.ndarray) -> float:
+        prior = float(np.sum(self.unknowns.precision * self.at.point.t**2))
+        gained = float(gradient @ np.linalg.solve(self.hessian, gradient)) if len(gradient) else 0.0
+        return float(row.ravel() @ row.ravel()) + prior - gained
+
+
+def metric_at(windows: Windows, unknowns: Unknowns, point: Point) -> Metric:
+    """The metric M at a point, from one batch of simulations."""
+    at = linearise(windows, unknowns, point)
+    H, g, r, J = normal_equations(at, unknowns)
+    return Metric(at, unknowns, H, g, r, J)
+
+
+def staged(whole: Plant, *members: str) -> Plant:
+    """The whole plant without the absent effects that bring states, but for the named members.
+
+    Absent effects without states cost next to nothing, and so all their sizes run on one plant.
+    """
+    plain = [effect.name for effect in whole.effects if not tuple(effect.states())]
+    return whole.lean(keep=[*plain, *members])
+
+
+def scan(
+    whole: Plant,
+    windows: Windows,
+    unknowns: Unknowns,
+    point: Point,
+    candidates: Iterable[Candidate],
+) -> list[Profile]:
+    """Profiles of all candidates, the one that explains most first.
+
+    ``whole`` is the windows' plant with all absent effects in their places.  Candidates with
+    states of their own are run on a plant that has them; the others share one.
+    """
+    metric = metric_at(windows, unknowns, point)
+    values = unknowns.values(point.t)
+    groups: dict[tuple[str, ...], list[Candidate]] = {}
+    for candidate in candidates:
+        groups.setdefault(_needed(windows.plant, candidate), []).append(candidate)
+    profiles = []
+    for needed, members in groups.items():
+        richer = windows.with_plant(staged(whole, *needed)) if needed else windows
+        starts = _starts(windows, richer, point)
+        trials = [
+            (candidate, change)
+            for candidate in members
+            for change in sizes_to_try(richer.plant, candidate)
+        ]
+        plants = [richer.plant.with_values({**values, **change}) for _, change in trials]
+        rows = metric.rows(richer.residuals(plants, starts))
+        profiles += _profiles(metric, trials, rows)
+    return sorted(profiles, key=lambda profile: -profile.drop)
+
+
+def sizes_to_try(plant: Plant, candidate: Candidate) -> list[dict[str, float]]:
+    """Parameter values of every size and shape of a candidate, within its bounds."""
+    known = plant.parameters[candidate.strength]
+    null = known.null or 0.0
+    signs = (1.0, -1.0) if known.signed else (1.0,)
+    shapes = [
+        dict(zip((f"{candidate.member}.{k}" for k in candidate.cause.shapes), v, strict=True))
+        for v in product(*candidate.cause.shapes.values())
+    ]
+    return [
+        {candidate.strength: null + sign * size * known.typical, **shape}
+        for sign in signs
+        for size in candidate.cause.sizes
+        if known.lower <= null + sign * size * known.typical <= known.upper
+        for shape in shapes
+    ]
+
+
+def _profiles(
+    metric: Metric, trials: list[tuple[Candidate, dict[str, float]]], rows: np.ndarray
+) -> list[Profile]:
+    found: dict[str, list[tuple[Trial, np.ndarray]]] = {}
+    before = metric.cost
+    for (candidate, change), row in zip(trials, rows, strict=True):
+        cost, step = metric.explained(row)
+        trial = Trial(candidate, change, before - cost, step)
+        found.setdefault(candidate.name, []).append((trial, row))
+    profiles = []
+    for pairs in found.values():
+        pairs.sort(key=lambda pair: -pair[0].drop)
+        best, row = pairs[0]
+        signature, share = metric.signature(metric.residual - row)
+        profiles.append(Profile(best.candidate, tuple(t for t, _ in pairs), signature, share))
+    return profiles
+
+
+def _needed(plant: Plant, candidate: Candidate) -> tuple[str, ...]:
+    """The members a candidate needs that bring states the plant does not have."""
+    return () if any(m.name == candidate.member for m in plant.members) else (candidate.member,)
+
+
+def _starts(windows: Windows, richer: Windows, point: Point) -> np.ndarray:
+    """Start states of the richer plant, those of the point where it has them."""
+    starts = richer.start.copy()
+    names = list(richer.plant.state_list)
+    for row, name in enumerate(windows.plant.state_list):
+        starts[names.index(name)] = point.starts[row]
+    return starts

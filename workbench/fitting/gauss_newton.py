@@ -1,0 +1,222 @@
+"""Maximum a posteriori fit of parameters over windows with free start states.
+
+    min over p, X0 of  sum_w |(y_w - yhat_w(p, x0_w)) / noise|^2 + |(p - p0) / s_p|^2
+                       + sum_w |(x0_w - guess_w) / s_x|^2
+
+by Gauss-Newton with Levenberg's damping.  Derivatives are forward differences over one large
+batched simulation: at kinks they are the better ones, and with a dozen columns they are cheaper
+than derivatives carried through the integrator (diagnosis.md 4.4).  The start states of a window
+appear in that window alone, so they are eliminated window by window (an orthogonal projection).
+
+Source: diagnosis.md 1.2 and 1.4; Golub and Pereyra's separable least squares in structure.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from workbench.fitting.unknowns import Unknowns
+from workbench.fitting.windows import Windows
+from workbench.plant import Plant
+
+PARAMETER_STEP = 0.25  # of the scale of an unknown
+START_STEP = 0.25  # of the deviation of a start state
+DAMPINGS = (0.0, 0.1, 1.0, 10.0)
+CONVERGED = 2e-3  # relative fall of the cost below which a fit has converged
+
+
+@dataclass(frozen=True)
+class Point:
+    """Where a fit stands.
+
+    t        scaled unknowns, shape (n_p,)
+    starts   start states, shape (n_x, n_windows)
+    """
+
+    t: np.ndarray
+    starts: np.ndarray
+
+
+@dataclass(frozen=True)
+class Linearised:
+    """Residuals and derivatives at a point with the start states projected out.
+
+    Attributes
+    ----------
+    residual
+        Weighted residuals per window, shape (n_windows, rows); the prior rows of the start states
+        come last.
+    parameters
+        Derivatives of the residual in the scaled unknowns, (n_windows, rows, n_p).
+    basis
+        Orthonormal basis of what the start states can do, (n_windows, rows, n_x).
+    triangle
+        Triangular factor that belongs to the basis, (n_windows, n_x, n_x).
+    """
+
+    point: Point
+    residual: np.ndarray
+    parameters: np.ndarray
+    basis: np.ndarray
+    triangle: np.ndarray
+
+    def projected(self, rows: np.ndarray) -> np.ndarray:
+        """What the start states cannot explain of columns (n_windows, rows, ...)."""
+        flat = rows.reshape(*rows.shape[:2], -1)
+        left = flat - self.basis @ (self.basis.transpose(0, 2, 1) @ flat)
+        return left.reshape(rows.shape)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fitted plant over windows.
+
+    Attributes
+    ----------
+    windows, unknowns, point
+        What was fitted, what was free, and where it ended.
+    chi2
+        Sum of the squared weighted residuals of the recorded samples, without priors.
+    cost
+        The same with the priors of parameters and start states.
+    converged
+        False where the last step still brought more than 0.2 %.
+    """
+
+    windows: Windows
+    unknowns: Unknowns
+    point: Point
+    chi2: float
+    cost: float
+    converged: bool
+
+    @property
+    def plant(self) -> Plant:
+        """The plant at the fitted values."""
+        return self.windows.plant.with_values(self.unknowns.values(self.point.t))
+
+    @property
+    def residual(self) -> np.ndarray:
+        """Weighted residuals of the recorded samples, shape (n_y, n_windows, L)."""
+        return self.windows.residuals([self.plant], self.point.starts)[0]
+
+
+def fit_windows(
+    windows: Windows, unknowns: Unknowns, start: Point | None = None, iterations: int = 8
+) -> Fit:
+    """Fit the unknowns and the start states; see the module's docstring.
+
+    Every step is taken only if the cost falls; a batch of damped steps is tried at once.
+    """
+    point = start or Point(unknowns.scaled(windows.plant.values), windows.start)
+    chi2, cost = (v[0] for v in _costs(windows, unknowns, [point]))
+    converged = False
+    for _ in range(iterations):
+        steps = _damped_steps(linearise(windows, unknowns, point), unknowns)
+        trials = [
+            Point(unknowns.clipped(point.t + dt), point.starts + dx * windows.start_deviation)
+            for dt, dx in steps
+        ]
+        chi2s, costs = _costs(windows, unknowns, trials)
+        best = int(np.argmin(costs))
+        if not costs[best] < cost:
+            converged = True
+            break
+        converged = bool(costs[best] > (1.0 - CONVERGED) * cost)
+        point, chi2, cost = trials[best], chi2s[best], costs[best]
+        if converged:
+            break
+    return Fit(windows, unknowns, point, float(chi2), float(cost), converged)
+
+
+def refit_starts(windows: Windows, iterations: int = 4) -> Fit:
+    """Only the start states move: how well a plant that is given predicts a recording."""
+    nothing = Unknowns((), *(np.zeros(0) for _ in range(5)))
+    return fit_windows(windows, nothing, iterations=iterations)
+
+
+def linearise(windows: Windows, unknowns: Unknowns, point: Point) -> Linearised:
+    """Residuals and derivatives by one batch of simulations; see :class:`Linearised`."""
+    n_x, n_p = windows.start.shape[0], len(unknowns)
+    h_x = START_STEP * windows.start_deviation
+    plants = [_plant_at(windows, unknowns, point.t)] * (1 + n_x)
+    starts = [point.starts] * (1 + n_x + n_p)
+    for k in range(n_x):
+        moved = point.starts.copy()
+        moved[k] += h_x[k]
+        starts[1 + k] = moved
+    h_p = _parameter_steps(unknowns, point.t)
+    plants += [_plant_at(windows, unknowns, point.t + h_p[k] * unit(n_p, k)) for k in range(n_p)]
+    r = windows.residuals(plants, np.array(starts)).transpose(0, 2, 1, 3)
+    n = len(windows)
+    r = r.reshape(len(plants), n, -1)
+    away = ((point.starts - windows.start) / windows.start_deviation).T
+    residual = np.concatenate([r[0], away], axis=1)
+    J_x = np.concatenate(
+        [
+            (r[1 : 1 + n_x] - r[0]).transpose(1, 2, 0) / START_STEP,
+            np.broadcast_to(np.eye(n_x), (n, n_x, n_x)),
+        ],
+        axis=1,
+    )
+    J_p = (r[1 + n_x :] - r[0]).transpose(1, 2, 0) / h_p
+    J_p = np.concatenate([J_p, np.zeros((n, n_x, n_p))], axis=1)
+    basis, triangle = np.linalg.qr(J_x) if n_x else (np.zeros((*residual.shape, 0)), np.zeros((n, 0, 0)))
+    return Linearised(point, residual, J_p, basis, triangle)
+
+
+def unit(n: int, k: int) -> np.ndarray:
+    """Unit vector k of n."""
+    return np.eye(n)[k]
+
+
+def normal_equations(
+    at: Linearised, unknowns: Unknowns
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """(H, g, projected residual, projected derivatives) of the cost in the scaled unknowns.
+
+    H = J'J + Lambda and g = J'r + Lambda t with the start states projected out.
+    """
+    r, J = at.projected(at.residual[:, :, None])[:, :, 0], at.projected(at.parameters)
+    flat = J.reshape(-1, J.shape[2])
+    prior = np.diag(unknowns.precision)
+    return flat.T @ flat + prior, flat.T @ r.ravel() + prior @ at.point.t, r, J
+
+
+def _damped_steps(
+    at: Linearised, unknowns: Unknowns
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Gauss-Newton steps of unknowns and start states, one per damping."""
+    H, g, _, _ = normal_equations(at, unknowns)
+    steps = []
+    for damping in DAMPINGS:
+        dt = -np.linalg.solve(H + damping * np.diag(np.diag(H)), g) if len(g) else np.zeros(0)
+        rest = at.residual + (at.parameters @ dt)
+        back = (at.basis.transpose(0, 2, 1) @ rest[:, :, None])[:, :, 0]
+        dx = -np.linalg.solve(at.triangle, back[:, :, None])[:, :, 0] if back.shape[1] else back
+        steps.append((dt, dx.T / (1.0 + damping)))
+    return steps
+
+
+def _costs(
+    windows: Windows, unknowns: Unknowns, points: list[Point]
+) -> tuple[np.ndarray, np.ndarray]:
+    """(chi2, cost with priors) of each point, shapes (n,)."""
+    plants = [_plant_at(windows, unknowns, point.t) for point in points]
+    r = windows.residuals(plants, np.array([point.starts for point in points]))
+    chi2 = np.sum(r**2, axis=(1, 2, 3))
+    away = np.array([(q.starts - windows.start) / windows.start_deviation for q in points])
+    prior = np.array([np.sum(unknowns.precision * q.t**2) for q in points])
+    return chi2, chi2 + prior + np.sum(away**2, axis=(1, 2))
+
+
+def _plant_at(windows: Windows, unknowns: Unknowns, t: np.ndarray) -> Plant:
+    return windows.plant.with_values(unknowns.values(t))
+
+
+def _parameter_steps(unknowns: Unknowns, t: np.ndarray) -> np.ndarray:
+    """Steps of the scaled unknowns, turned round where they would leave the bounds."""
+    room = (unknowns.upper - unknowns.prior) / unknowns.scale - t
+    return np.where(room > PARAMETER_STEP, PARAMETER_STEP, -PARAMETER_STEP)

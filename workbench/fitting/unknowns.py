@@ -1,0 +1,82 @@
+"""Which parameters a fit may move, and what is believed of them before it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from workbench.plant import Candidate, Plant
+
+WIDE = 1e3  # prior deviations of an added cause, in typical sizes: bounds alone hold it
+
+
+@dataclass(frozen=True)
+class Unknowns:
+    """Free parameters with their prior, bounds and steps for differences; each array (n_p,).
+
+    A fit moves t = (value - prior) / scale.  ``precision`` is the prior's weight on t**2, 1 for a
+    parameter with a prior and nearly 0 for an added cause.
+    """
+
+    names: tuple[str, ...]
+    prior: np.ndarray
+    scale: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    precision: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def values(self, t: np.ndarray) -> dict[str, float]:
+        """Parameter values at scaled unknowns, kept within their bounds."""
+        raw = self.prior + self.scale * t
+        return dict(zip(self.names, np.clip(raw, self.lower, self.upper).tolist(), strict=True))
+
+    def scaled(self, values: Mapping[str, float]) -> np.ndarray:
+        """Scaled unknowns of parameter values, shape (n_p,)."""
+        return np.array([values[name] for name in self.names]) / self.scale - (
+            self.prior / self.scale
+        )
+
+    def clipped(self, t: np.ndarray) -> np.ndarray:
+        """Scaled unknowns within their bounds."""
+        return np.clip(
+            t, (self.lower - self.prior) / self.scale, (self.upper - self.prior) / self.scale
+        )
+
+
+def nominal_unknowns(
+    plant: Plant,
+    deviations: Mapping[str, float] | None = None,
+    fixed: Iterable[str] = (),
+    added: Iterable[Candidate] = (),
+) -> Unknowns:
+    """Every uncertain parameter of what is present, and the strengths and forms of what is added.
+
+    ``deviations`` are standard deviations that override the catalogue's; ``fixed`` are never
+    moved.  A strength at its null is absent, and is not moved unless its cause is in ``added``.
+    """
+    values, known = plant.values, plant.parameters
+    deviations, fixed = dict(deviations or {}), set(fixed)
+    measured = {signal.name for signal in plant.measured_inputs}
+    free = [name for c in added for name in (c.strength, *c.forms) if name not in fixed]
+    rows = []
+    for name, value in values.items():
+        deviation = deviations.get(name, known[name].standard_deviation(value))
+        absent = known[name].null is not None and value == known[name].null
+        if name in free or name in fixed or name in measured or absent or deviation == 0.0:
+            continue
+        rows.append((name, value, deviation, 1.0))
+    rows += [(name, values[name], _size(plant, name), WIDE**-2) for name in free]
+    names = tuple(row[0] for row in rows)
+    prior, scale, precision = (np.array([row[k] for row in rows]) for k in (1, 2, 3))
+    lower, upper = (np.array([getattr(known[n], k) for n in names]) for k in ("lower", "upper"))
+    return Unknowns(names, prior, scale, lower, upper, precision)
+
+
+def _size(plant: Plant, name: str) -> float:
+    """A tenth of typical: the step in which an added strength or form is counted."""
+    return 0.1 * abs(plant.parameters[name].typical)
