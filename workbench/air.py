@@ -122,7 +122,7 @@ class Path:
     @cached_property
     def ratio(self) -> Expression:
         """Downstream over upstream pressure, at most 1; negative only where no gas can be."""
-        return ca.fmin(self.above_pa, self.below_pa) / self._upstream_pa
+        return (self.above_pa - self._fall_pa) / self._upstream_pa
 
     @cached_property
     def choked_kg_s_m2(self) -> Expression:
@@ -132,8 +132,17 @@ class Path:
         return direction * size / ca.sqrt(self.temperature_k)
 
     @cached_property
+    def _fall_pa(self) -> Expression:
+        """Pressure difference where gas flows forward, else zero.
+
+        Upstream and downstream are chosen by it, because the derivative of a minimum is shared
+        between both arguments where they are equal, and the slope of the flow would be lost there.
+        """
+        return ca.if_else(self.forward, self.above_pa - self.below_pa, 0.0)
+
+    @cached_property
     def _upstream_pa(self) -> Expression:
-        return ca.fmax(ca.fmax(self.above_pa, self.below_pa), LOWEST_PRESSURE_PA)
+        return ca.fmax(self.below_pa + self._fall_pa, LOWEST_PRESSURE_PA)
 
     def flow_kg_s(self, area_m2: Expression, law: FlowLaw) -> Expression:
         """Mass flow from above to below through an effective area.

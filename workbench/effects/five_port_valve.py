@@ -86,6 +86,11 @@ class FivePortValve(Effect):
     cracking_ratio: Expression = form(0.995, lower=0.8, upper=1.0)
     subsonic_index: Expression = form(0.52, lower=0.3, upper=0.9)
 
+    @property
+    def absent(self) -> bool:
+        """Never: with all its flaws at null it is still the valve."""
+        return False
+
     def terms(self, now: Conditions) -> Iterator[MassFlow]:
         offset_v = now[self.name].command_v - self.centre_v
         forward = self._area_m2(offset_v, self.full_v - self.centre_v)
