@@ -9,6 +9,7 @@ from workbench.effects.sensor_offset import (
     PositionSensorOffset,
     PressureSensorOffset,
 )
+from workbench.effects.stribeck_friction import StribeckFriction
 from workbench.effects.supply_droop import SupplyDroop
 from workbench.effects.valve_command import CommandDelay, DeadZone, ValveLag, ValveOffset
 from workbench.effects.wall_heat import WallHeat
@@ -27,6 +28,7 @@ CATALOGUE = (
     PositionSensorOffset,
     PressureSensorOffset,
     SpringForce,
+    StribeckFriction,
     SupplyDroop,
     ValveLag,
     ValveOffset,

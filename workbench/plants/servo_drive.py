@@ -60,6 +60,7 @@ def _friction() -> BristleFriction:
     return BristleFriction(
         name="friction",
         body="slide",
+        chambers=("chamber_a", "chamber_b"),
         coulomb_force_n=coulomb_n,
         stiction_excess_n=excess_n,
         viscous_n_s_m=viscous_n_s_m,
