@@ -134,9 +134,9 @@ class DeadZone(Effect):
             return value
         offset_v, w = value - self.centre_v, self.half_width_v
         above_v, below_v = self.full_v - self.centre_v, self.centre_v
-        above = ca.fmax(offset_v - w, 0.0) * above_v / (above_v - w)
-        below = ca.fmin(offset_v + w, 0.0) * below_v / (below_v - w)
-        return self.centre_v + above + below
+        above = ca.fmax(offset_v - w, 0.0) * (above_v / (above_v - w))
+        below = ca.fmin(offset_v + w, 0.0) * (below_v / (below_v - w))
+        return value + (above + below - offset_v)  # exactly the value where there is no zone
 
     def undo(self, wanted_v: float) -> float:
         """The command that comes out as ``wanted_v``: what a controller sends to jump the band."""
