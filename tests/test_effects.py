@@ -33,6 +33,16 @@ def silenced(plant, member):
     return plant.with_values({f"{member.name}.{k}": null for k, null in strengths(member).items()})
 
 
+def with_siblings(plant, member, key):
+    """One strength at null, the others of its effect present: a modifier needs what it modifies."""
+    values = {
+        f"{member.name}.{k}": v.typical
+        for k, v in member.parameters().items()
+        if v.null is not None and getattr(member, k) == v.null
+    }
+    return plant.with_values(values | {f"{member.name}.{key}": strengths(member)[key]})
+
+
 def kinked(member, key):
     return any(cause.kinked and cause.strength == key for cause in member.causes)
 
@@ -131,11 +141,11 @@ def test_a_strength_at_null_can_still_be_felt_by_the_derivative(plant, condition
     for member in plant.members:
         for key in () if acts_on_sequences(member) else strengths(member):
             name, known = f"{member.name}.{key}", member.parameters()[key]
-            null = plant.with_values({name: known.null})
+            null = with_siblings(plant, member, key)
             column = slope(null, at, name)
             if kinked(member, key):
                 little = known.null + SMALL_SHARE * (known.typical - known.null)
-                here, there = answers(null, at), answers(plant.with_values({name: little}), at)
+                here, there = answers(null, at), answers(null.with_values({name: little}), at)
                 column = np.array([there[k] - here[k] for k in here])
 
             assert np.isfinite(column).all(), f"{name} has no finite slope at null"

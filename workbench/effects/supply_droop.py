@@ -24,10 +24,11 @@ from workbench.effect import (
 class SupplyDroop(Effect):
     """A small tank behind a regulator: the supply pressure falls with the flow drawn, with a lag.
 
-    tau d(drop)/dt = R mdot_drawn - drop,   p_s = p_set - drop
+    tau dq/dt = mdot_drawn - q,   p_s = p_set - R q
 
     This is V_t dP_s/dt = kappa R_air T (G_r (P_set - P_s) - mdot) with R = 1/G_r and
-    tau = V_t R / (kappa R_air T), written so that R = 0 is regular.
+    tau = V_t R / (kappa R_air T).  The state is the flow q that the regulator delivers, so that at
+    R = 0 nothing of it is left.
 
     Source: physics.md section 6 (supply_droop); a tank reduces it in paper 002, measured in 003.
     """
@@ -50,12 +51,13 @@ class SupplyDroop(Effect):
     refill_time_s: Expression = form(0.1, lower=5e-3, upper=10.0)
 
     def states(self) -> Iterator[State]:
-        yield State("drop_pa", initial=0.0, scale=1e4, tolerance=100.0)
+        yield State("delivered_kg_s", initial=0.0, scale=1e-3, tolerance=2e-6)
 
     def alter(self, signal: str, value: Expression, now: Conditions) -> Expression:
-        return value - now[self.name].drop_pa if signal == self.produces else value
+        if signal != self.produces:
+            return value
+        return value - self.resistance_pa_s_kg * now[self.name].delivered_kg_s
 
     def rates(self, now: Conditions, received: Received) -> dict[str, Expression]:
         drawn_kg_s = -sum(t.value for t in received("supply") if isinstance(t, MassFlow))
-        wanted_pa = self.resistance_pa_s_kg * drawn_kg_s
-        return {"drop_pa": (wanted_pa - now[self.name].drop_pa) / self.refill_time_s}
+        return {"delivered_kg_s": (drawn_kg_s - now[self.name].delivered_kg_s) / self.refill_time_s}
