@@ -32,29 +32,39 @@ class Misfit:
     differences: dict[str, float]
 
 
-def scaled(cases: Sequence[Case], redraws: int = 4) -> list[Case]:
+def scaled(cases: Sequence[Case], rounds: int = 12) -> list[Case]:
     """Cases whose hidden effect is visible and whose differences are each below 20 % of it.
 
-    An invisible hidden effect gets a new size, up to `redraws` times; a difference that is too
-    large is halved until it is small enough (misfit goes with the square of the amplitude).
-    Null cases are returned as they are.
+    An invisible hidden effect gets a new size; a difference that is too large is halved (misfit
+    goes about with the square of the amplitude).  Both change the path, so every changed case is
+    measured again until the rule holds.  Null cases are returned as they are.
+
+    Raises RuntimeError if the rule does not hold after `rounds` measurements.
     """
     done = list(cases)
     todo = [i for i, case in enumerate(cases) if case.hidden]
-    for attempt in range(redraws + 1):
+    for _ in range(rounds):
         found = misfits([done[i] for i in todo])
         again = []
         for i, misfit in zip(todo, found, strict=True):
-            if misfit.hidden < VISIBLE and attempt < redraws:
-                rng = generator(done[i].hidden, done[i].seed, f"size {attempt}")
-                done[i] = resized(done[i], draw_size(done[i].hidden, rng))
+            better = corrected(done[i], misfit)
+            if better != done[i]:
+                done[i] = better
                 again.append(i)
-            else:
-                done[i] = shrink(done[i], halvings(misfit))
         todo = again
         if not todo:
-            break
-    return done
+            return done
+    names = ", ".join(f"{done[i].hidden} seed {done[i].seed}" for i in todo)
+    raise RuntimeError(f"truth: {names} do not meet the misfit rule after {rounds} rounds")
+
+
+def corrected(case: Case, misfit: Misfit) -> Case:
+    """The case with a new size or smaller differences; the same case if it meets the rule."""
+    if misfit.hidden < VISIBLE:
+        rng = generator(case.hidden, case.seed, f"size {case.redraws}")
+        return resized(case, draw_size(case.hidden, rng))
+    factors = halvings(misfit)
+    return shrink(case, factors) if factors else case
 
 
 def halvings(misfit: Misfit) -> dict[str, float]:
