@@ -114,32 +114,34 @@ class Body(Part):
 
 @dataclass(frozen=True, kw_only=True)
 class HeldRod(Part):
-    """A rod held by a force sensor while its motion and the pressure are recorded.
+    """A rod that a force sensor pushes along while its motion and the pressure are recorded.
 
-    sensor force = sum of forces on the rod; no state.
+    The motion is slow, so the sensor holds the balance: its force on the rod, positive towards
+    growing position, is minus the sum of all others; no state.
 
     Source: physics.md 2.7, ``cylinder_bench``.
     """
 
     def close(self, now: Conditions, received: Received) -> dict[str, Expression]:
-        return {"force_n": total(received(self.name), Force)}
+        return {"force_n": -total(received(self.name), Force)}
 
 
 @dataclass(frozen=True, kw_only=True)
 class PressureFace(Part):
     """A piston face under a recorded chamber pressure, ambient on the other side.
 
-    F = (p - p_atm) A
+    F = side (p - p_atm) A,    side +1 where pressure pushes towards growing position
 
     Source: physics.md 2.7, the plants of the real recordings.
     """
 
     body: str
+    side: int = 1
     area_m2: Expression = form(5e-4, lower=1e-9)
 
     def terms(self, now: Conditions) -> Iterator[Force]:
         gauge_pa = now[self.name].pressure_pa - now["atmosphere"].pressure_pa
-        yield Force(self.body, self.area_m2 * gauge_pa)
+        yield Force(self.body, self.side * self.area_m2 * gauge_pa)
 
 
 @dataclass(frozen=True, kw_only=True)

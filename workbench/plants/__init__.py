@@ -1,5 +1,11 @@
 """The plants of the papers.  A new plant is one file here and one line below."""
 
+from workbench.plants.cylinder_bench import cylinder_bench
 from workbench.plants.servo_drive import servo_drive
+from workbench.plants.vertical_cylinder import vertical_cylinder
 
-PLANTS = {"servo_drive": servo_drive}
+PLANTS = {
+    "servo_drive": servo_drive,
+    "vertical_cylinder": vertical_cylinder,
+    "cylinder_bench": cylinder_bench,
+}
