@@ -106,8 +106,9 @@ class Mode:
 
 @dataclass(frozen=True)
 class HybridModel:
-    """A plant as a set of modes that together cover its operating range."""
+    """A plant as a set of modes of its design model that together cover its operating range."""
 
+    plant: Plant
     model: DesignModel
     modes: tuple[Mode, ...]
 
@@ -143,7 +144,9 @@ def hybrid_modes(
     """One mode for every combination of intervals, each linearised where ``placing`` says."""
     model = design_model(plant)
     boxes = (dict(zip(cuts, intervals, strict=True)) for intervals in product(*cuts.values()))
-    return HybridModel(model, tuple(linearised(model, box, placing(model, box)) for box in boxes))
+    return HybridModel(
+        plant, model, tuple(linearised(model, box, placing(model, box)) for box in boxes)
+    )
 
 
 def linearised(model: DesignModel, box: Mapping[str, Interval], point: OperatingPoint) -> Mode:

@@ -17,7 +17,7 @@ import numpy as np
 
 from workbench.effects.bristle_friction import BristleFriction
 from workbench.effects.supply_droop import SupplyDroop
-from workbench.effects.valve_command import CommandDelay, DeadZone
+from workbench.effects.valve_command import CommandDelay, DeadZone, ValveOffset
 from workbench.plant import Plant
 
 
@@ -119,6 +119,13 @@ def design_model(plant: Plant) -> DesignModel:
     design = lean.with_values(nulls)
     kept = tuple(name for name in design.model.states if not _passed_over(design, name))
     return DesignModel(design, kept, tuple(_left_out(lean)))
+
+
+def closed_command(plant: Plant) -> float:
+    """The first command's value that opens nothing: its nominal one and the valve's offset."""
+    signal = plant.commands[0]
+    offsets = (e for e in plant.effects if isinstance(e, ValveOffset) and e.signal == signal.name)
+    return signal.nominal + sum(float(effect.offset_v) for effect in offsets)
 
 
 def _passed_over(plant: Plant, state: str) -> bool:

@@ -7,7 +7,7 @@ from math import inf
 
 from linearize.equilibrium import OperatingPoint, operating_point
 from linearize.modes import HybridModel, Interval, hybrid_modes
-from linearize.reduction import DesignModel
+from linearize.reduction import DesignModel, closed_command
 from workbench.effects.forces import EndStops
 from workbench.plant import Plant
 
@@ -25,7 +25,7 @@ def servo_drive_cuts(plant: Plant) -> dict[str, tuple[Interval, ...]]:
 
     Source: physics.md 4.3 (valve and friction); thirds because stiffness goes with 1 / volume.
     """
-    centre_v = plant.nominal[0][0]
+    centre_v = closed_command(plant)
     third_m = next(e.upper_m for e in plant.effects if isinstance(e, EndStops)) / 3.0
     low_v, high_v = centre_v - CLOSED_V, centre_v + CLOSED_V
     return {
@@ -55,7 +55,7 @@ def servo_drive_point(model: DesignModel, box: Mapping[str, Interval]) -> Operat
     """
     points = {name: interval.point for name, interval in box.items()}
     if points[VELOCITY] == 0.0:
-        closed = {**points, COMMAND: model.plant.nominal[0][0]}
+        closed = {**points, COMMAND: closed_command(model.plant)}
         found = operating_point(model, closed, PRESSURES, PRESSURES)
     else:
         sliding = {name: points[name] for name in (POSITION, VELOCITY)}

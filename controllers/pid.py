@@ -1,0 +1,115 @@
+"""PID control of the position, with the gains from the poles of each mode."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from controllers.positioning import STATES, Memory, Positioning, PositioningSpec, positioning
+from controllers.scheduled import Schedule, scheduled
+from linearize.modes import HybridModel, Mode
+from linearize.standard import POSITION, VELOCITY
+from workbench.contracts import Command, Estimate
+
+
+@dataclass(frozen=True, kw_only=True)
+class PidSpec:
+    """How a PID is tuned on a mode, and its clock.
+
+    Attributes
+    ----------
+    stiffening
+        Square of the closed loop's fast frequency over that of the pneumatic spring, above 1.
+    share_of_limit
+        Proportional gain over the one at which the loop begins to swing.
+    integral_time_s
+        K_p / K_i.
+    filter_s
+        Time constant of the filter on the velocity.
+    """
+
+    sample_time_s: float = 1e-3
+    stiffening: float = 1.6
+    share_of_limit: float = 0.3
+    integral_time_s: float = 0.5
+    filter_s: float = 2e-3
+    positioning: PositioningSpec = field(
+        default_factory=lambda: PositioningSpec(approach_m=0.3, stribeck_share=0.0)
+    )
+
+
+@dataclass(frozen=True)
+class PidGain:
+    """Gains in V/m, V/(m s) and V s/m, and the poles of the mode under K_p and K_d, 1/s."""
+
+    proportional: float
+    integral: float
+    derivative: float
+    poles: np.ndarray
+
+
+@dataclass(frozen=True)
+class Pid:
+    """Opening = that of steady sliding - K_p e - K_i integral - K_d (v - v_r), two degrees.
+
+    The derivative acts on the estimated velocity, filtered; a step of the reference does not kick.
+    The plan of the memory is the filtered velocity.
+    """
+
+    task: Positioning
+    gains: Schedule[PidGain]
+    sample_time_s: float
+    filter_s: float
+    preview: int = 2
+
+    def start(self) -> Command:
+        return Command(self.task.valve.shut, Memory(plan=0.0))
+
+    def step(self, last: Command, reference: np.ndarray, estimate: Estimate) -> Command:
+        memory, valve, dt = last.memory, self.task.valve, self.sample_time_s
+        now = self.task.task(memory, reference, estimate.pick(STATES), dt)
+        slow = memory.plan + dt / (dt + self.filter_s) * (now.x[1] - memory.plan)
+        if now.rests:
+            return Command(valve.shut, Memory(memory.integral_m_s, True, slow), {"resting": 1.0})
+        here = [*self.gains.weighted(now.x[0], now.ahead)]
+        kp, ki, kd = (
+            sum(w * getattr(gain, key) for w, gain in here)
+            for key in ("proportional", "integral", "derivative")
+        )
+        integral = memory.integral_m_s + dt * now.rate_m
+        error_m = now.x[0] - now.target[0]
+        wanted = now.opening_v - kp * error_m - ki * integral - kd * (slow - now.speed_m_s)
+        opening = float(np.clip(wanted, *valve.openings_v))
+        if opening != wanted:
+            integral = memory.integral_m_s
+        notes = {"resting": 0.0, "opening_v": opening, "integral_m_s": integral}
+        return Command(valve.command(opening), Memory(integral, False, slow), notes)
+
+
+def pid(hybrid: HybridModel, spec: PidSpec | None = None) -> Pid:
+    """PID gains on every mode in which the valve drives the motion."""
+    spec = spec or PidSpec()
+    gains = scheduled(hybrid, lambda mode: pid_gain(mode, spec))
+    task = positioning(hybrid, spec.positioning)
+    return Pid(task, gains, spec.sample_time_s, spec.filter_s)
+
+
+def pid_gain(mode: Mode, spec: PidSpec) -> PidGain:
+    """Gains from the mode taken as b / (s (s^2 + 2 z w s + w^2)) from opening to position.
+
+    With K_d the spring frequency rises to w sqrt(stiffening); the loop swings at
+    b K_p = 2 z w^3 stiffening (Routh), of which ``share_of_limit`` is taken.
+    """
+    A, B = mode.A, mode.B
+    poles = np.linalg.eigvals(A)
+    pair = poles[np.argmax(poles.imag)]
+    spring, damping = abs(pair) ** 2, -2.0 * pair.real
+    v = mode.state_names.index(VELOCITY)
+    b = float((A @ B)[v, 0])  # jerk per volt
+    kd = (spec.stiffening - 1.0) * spring / b
+    kp = spec.share_of_limit * damping * spring * spec.stiffening / b
+    feedback = np.zeros(len(A))
+    feedback[[mode.state_names.index(POSITION), v]] = kp, kd
+    closed = np.linalg.eigvals(A - B @ feedback[None, :])
+    return PidGain(kp, kp / spec.integral_time_s, kd, closed)

@@ -1,0 +1,214 @@
+"""What every position controller of a pneumatic slide shares: target, dry friction, rest.
+
+Steady sliding.  At a speed v the slide needs certain pressures and a certain opening; both are
+straight lines in v that follow from the modes, Coulomb friction in their drift included.
+
+Stribeck.  Below the Stribeck velocity friction rises above Coulomb's; a share of that rise is
+added to the wanted pressure difference in the direction in which the slide is to move.
+
+Rest.  A pneumatic slide with dry friction hunts under plain integral action: chamber and
+integrator both keep charging while the slide sticks, and it breaks away too far.  So inside a
+small band, at rest, the valve is shut and the integral frozen, until the error leaves a wider
+band or the reference moves.  Outside the band the integral runs fast while the slide sticks and
+slow while it moves, so that it breaks away soon but gently.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from controllers.scheduled import Schedule, scheduled
+from controllers.through_valve import ThroughValve, through_valve
+from linearize.modes import HybridModel, Mode
+from linearize.reduction import closed_command
+from linearize.standard import POSITION, PRESSURES, VELOCITY
+from workbench.effect import Conditions
+from workbench.effects.stribeck_friction import StribeckFriction
+from workbench.parts import Chamber
+
+FAST_M_S = 1e3  # no Stribeck peak there
+STATES = (POSITION, VELOCITY, *PRESSURES)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PositioningSpec:
+    """Numbers of the positioning task that all controllers share.
+
+    Attributes
+    ----------
+    approach_m
+        Errors above this count as this, which limits the speed of approach.
+    fastest_m_s
+        A reference that moves faster has jumped, and asks for no speed.
+    band_m, leave_m, resting_m_s
+        Rest begins inside ``band_m`` below ``resting_m_s`` and ends outside ``leave_m``.
+    integrate_m
+        Error below which the integral runs while the slide moves.
+    stuck_factor
+        How many times faster the integral runs while the slide sticks.
+    stribeck_share
+        Share of the Stribeck rise that is compensated.
+    turn_per_s, turn_m_s
+        The direction is that of v_r - turn_per_s * error, mixed within ``turn_m_s``.
+    smooth_v
+        Opening over which the jump across the dead zone builds up.
+    """
+
+    approach_m: float = 0.03
+    fastest_m_s: float = 2.0
+    band_m: float = 5e-5
+    leave_m: float = 1e-4
+    resting_m_s: float = 5e-3
+    integrate_m: float = 2e-3
+    stuck_factor: float = 8.0
+    stribeck_share: float = 0.8
+    turn_per_s: float = 50.0
+    turn_m_s: float = 0.02
+    smooth_v: float = 0.01
+
+
+@dataclass(frozen=True)
+class Memory:
+    """What a position controller remembers: integral of the error in m s, rest, and its plan."""
+
+    integral_m_s: float = 0.0
+    resting: bool = False
+    plan: Any = None
+
+
+@dataclass(frozen=True)
+class Steady:
+    """Pressures and opening of steady sliding, at zero speed and per m/s, on one mode.
+
+    level, slope       (p_a, p_b, opening), shape (3,)
+    """
+
+    level: np.ndarray
+    slope: np.ndarray
+
+
+@dataclass(frozen=True)
+class Task:
+    """One sample of the positioning task.
+
+    x             position, velocity and pressures, shape (4,)
+    target        where they should be, shape (4,); the position within the approach of x
+    opening_v     of steady sliding at the wanted speed
+    error_m       true error, not limited
+    ahead         1 forward, 0 backward
+    rests         the valve stays shut
+    rate_m        what the integral grows by per second
+    """
+
+    x: np.ndarray
+    target: np.ndarray
+    opening_v: float
+    error_m: float
+    speed_m_s: float
+    ahead: float
+    rests: bool
+    rate_m: float
+
+    @property
+    def deviation(self) -> np.ndarray:
+        """State minus target, shape (4,)."""
+        return self.x - self.target
+
+
+@dataclass(frozen=True, kw_only=True)
+class Positioning:
+    """The task on one plant."""
+
+    spec: PositioningSpec
+    valve: ThroughValve
+    steady: Schedule[Steady]
+    friction: StribeckFriction | None
+    area_m2: float
+
+    def task(
+        self, memory: Memory, reference: np.ndarray, x: np.ndarray, sample_time_s: float
+    ) -> Task:
+        """The task now, from a reference of at least two columns, shape (1, preview)."""
+        spec, error_m = self.spec, float(x[0] - reference[0, 0])
+        speed_m_s = (reference[0, 1] - reference[0, 0]) / sample_time_s
+        if abs(speed_m_s) > spec.fastest_m_s:
+            speed_m_s = 0.0
+        wish = (speed_m_s - spec.turn_per_s * error_m) / spec.turn_m_s
+        ahead = 0.5 + 0.5 * np.tanh(wish)
+        steady = sum(
+            w * (s.level + s.slope * speed_m_s) for w, s in self.steady.weighted(x[0], ahead)
+        )
+        rise_pa = self._stribeck_n(x[1]) * (2.0 * ahead - 1.0) / (2.0 * self.area_m2)
+        near = x[0] - np.clip(error_m, -spec.approach_m, spec.approach_m)
+        target = np.array([near, speed_m_s, steady[0] + rise_pa, steady[1] - rise_pa])
+        rests = self._rests(memory, error_m, x[1], speed_m_s)
+        return Task(
+            x, target, steady[2], error_m, speed_m_s, ahead, rests, self._rate_m(error_m, x[1])
+        )
+
+    def _rests(self, memory: Memory, error_m: float, v_m_s: float, speed_m_s: float) -> bool:
+        spec = self.spec
+        if speed_m_s != 0.0:
+            return False
+        if memory.resting:
+            return abs(error_m) < spec.leave_m
+        return abs(error_m) < spec.band_m and abs(v_m_s) < spec.resting_m_s
+
+    def _rate_m(self, error_m: float, v_m_s: float) -> float:
+        spec = self.spec
+        if abs(v_m_s) < spec.resting_m_s / 2.0:
+            return spec.stuck_factor * float(np.clip(error_m, -spec.integrate_m, spec.integrate_m))
+        return error_m if abs(error_m) < spec.integrate_m else 0.0
+
+    def _stribeck_n(self, v_m_s: float) -> float:
+        """The compensated share of g(v) - F_C."""
+        return self.spec.stribeck_share * float(self.rise_n(v_m_s)) if self.friction else 0.0
+
+    @cached_property
+    def rise_n(self) -> ca.Function:
+        """Velocity -> dry friction above that of fast sliding, at the start of the stroke."""
+        v, friction, now = ca.SX.sym("v"), self.friction, Conditions()
+        for name in (*friction.chambers, "atmosphere"):
+            now.place(f"{name}.pressure_pa", 0.0)
+        now.place(f"{friction.body}.position_m", 0.0)
+        forces = []
+        for velocity in (v, FAST_M_S):
+            now.place(f"{friction.body}.velocity_m_s", velocity)
+            forces.append(friction.dry_force_n(now))
+        return ca.Function("rise", [v], [forces[0] - forces[1]])
+
+
+def positioning(hybrid: HybridModel, spec: PositioningSpec) -> Positioning:
+    """The positioning task on the modes of a plant with one valve and two chambers."""
+    plant = hybrid.model.plant
+    real = hybrid.plant.lean()
+    friction = [e for e in plant.effects if isinstance(e, StribeckFriction)]
+    centre_v = closed_command(plant)
+    return Positioning(
+        spec=spec,
+        valve=through_valve(real, spec.smooth_v),
+        steady=scheduled(hybrid, lambda mode: steady_sliding(mode, centre_v)),
+        friction=friction[0] if friction else None,
+        area_m2=next(m.area_m2 for m in plant.parts if isinstance(m, Chamber)),
+    )
+
+
+def steady_sliding(mode: Mode, centre_v: float) -> Steady:
+    """Where acceleration and pressure rates of a mode vanish, as a line in the velocity.
+
+    0 = drift + A_p (p - p0) + A_v (v - v0) + B (u - u0), solved for p and u.
+    """
+    rows = [mode.state_names.index(name) for name in (VELOCITY, *PRESSURES)]
+    pressures = [mode.state_names.index(name) for name in PRESSURES]
+    v = mode.state_names.index(VELOCITY)
+    known = np.column_stack([mode.A[np.ix_(rows, pressures)], mode.B[rows]])
+    size = mode.scale[rows, None]
+    right = -np.column_stack([mode.drift[rows], mode.A[rows, v]])
+    found = np.linalg.solve(known / size, right / size)
+    at_point = np.array([*mode.state[pressures], mode.command[0] - centre_v]) + found[:, 0]
+    return Steady(at_point - found[:, 1] * mode.state[v], found[:, 1])

@@ -1,0 +1,68 @@
+"""One design per mode, and which of them count: by direction of motion and place on the stroke.
+
+Between the points of two neighbouring modes their designs are mixed linearly, and between the two
+directions by how clearly the slide is to move: so nothing jumps when the mode changes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+import numpy as np
+
+from linearize.modes import HybridModel, Mode
+from linearize.reduction import closed_command
+from linearize.standard import COMMAND, POSITION, VELOCITY
+
+Design = TypeVar("Design")
+
+
+@dataclass(frozen=True)
+class Schedule(Generic[Design]):
+    """Designs on the modes in which the valve drives the motion.
+
+    Attributes
+    ----------
+    positions_m
+        Points of the modes along the stroke, rising, shape (n,).
+    forward, backward
+        One design per point, for motion towards larger and smaller positions.
+    """
+
+    positions_m: np.ndarray
+    forward: tuple[Design, ...]
+    backward: tuple[Design, ...]
+
+    def weighted(self, position_m: float, ahead: float) -> Iterator[tuple[float, Design]]:
+        """Designs that count here with their weights; ``ahead`` is 1 forward, 0 backward."""
+        last = len(self.positions_m) - 1
+        place = float(np.interp(position_m, self.positions_m, np.arange(last + 1)))
+        left = min(int(place), last - 1)
+        right_share = place - left
+        for share, designs in ((ahead, self.forward), (1.0 - ahead, self.backward)):
+            yield share * (1.0 - right_share), designs[left]
+            yield share * right_share, designs[left + 1]
+
+    def heaviest(self, position_m: float, ahead: float) -> Design:
+        """The design with the largest weight, for what cannot be mixed."""
+        return max(self.weighted(position_m, ahead), key=lambda pair: pair[0])[1]
+
+
+def driven_modes(hybrid: HybridModel) -> tuple[list[Mode], list[Mode]]:
+    """Modes whose valve drives the motion, forward and backward, by rising position."""
+    sides = ([], [])
+    for mode in hybrid.modes:
+        speed = mode.box[VELOCITY].point
+        drive = mode.box[COMMAND].point - closed_command(hybrid.plant)
+        if speed * drive > 0.0:
+            sides[speed < 0.0].append(mode)
+    return tuple(sorted(side, key=lambda mode: mode.box[POSITION].point) for side in sides)
+
+
+def scheduled(hybrid: HybridModel, design: Callable[[Mode], Design]) -> Schedule[Design]:
+    """The same design method on every driven mode."""
+    forward, backward = driven_modes(hybrid)
+    points = np.array([mode.box[POSITION].point for mode in forward])
+    return Schedule(points, tuple(map(design, forward)), tuple(map(design, backward)))

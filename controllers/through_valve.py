@@ -1,0 +1,73 @@
+"""From a wanted opening of the valve to its command: the dead zone is undone on the way."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from linearize.reduction import closed_command
+from workbench.effects.valve_command import DeadZone
+from workbench.plant import Plant
+
+
+@dataclass(frozen=True)
+class ThroughValve:
+    """Command of one proportional valve for an opening in volts behind its dead zone.
+
+    u = u_c + o + j(o) tanh(|o| / o_s),   j = jump that the dead zone needs at o
+
+    Within a few o_s of zero only part of the jump is made: the valve stays shut there, so that
+    noise on a small opening does not throw the spool across the band.
+
+    Attributes
+    ----------
+    centre_v, lower_v, upper_v
+        Command that opens nothing, and its range.
+    offset_v
+        Part of the centre that the valve takes off before its dead zone.
+    dead_zone
+        What is undone; None where the plant has none.
+    smooth_v
+        o_s, the opening over which the jump builds up.
+    """
+
+    centre_v: float
+    lower_v: float
+    upper_v: float
+    offset_v: float
+    dead_zone: DeadZone | None
+    smooth_v: float
+
+    def command(self, opening_v: float) -> np.ndarray:
+        """The command for an opening, shape (1,), within its range."""
+        wanted_v = self.centre_v + opening_v
+        through_v = wanted_v
+        if self.dead_zone is not None:
+            through_v = self.offset_v + self.dead_zone.undo(wanted_v - self.offset_v)
+        jump_v = (through_v - wanted_v) * np.tanh(abs(opening_v) / self.smooth_v)
+        return np.array([np.clip(wanted_v + jump_v, self.lower_v, self.upper_v)])
+
+    @property
+    def shut(self) -> np.ndarray:
+        """The command that opens nothing, shape (1,)."""
+        return np.array([self.centre_v])
+
+    @property
+    def openings_v(self) -> tuple[float, float]:
+        """Smallest and largest opening."""
+        return self.lower_v - self.centre_v, self.upper_v - self.centre_v
+
+
+def through_valve(plant: Plant, smooth_v: float) -> ThroughValve:
+    """The valve of a plant with one command."""
+    signal = plant.commands[0]
+    found = [e for e in plant.effects if isinstance(e, DeadZone) and e.signal == signal.name]
+    return ThroughValve(
+        centre_v=closed_command(plant),
+        lower_v=signal.lower,
+        upper_v=signal.upper,
+        offset_v=closed_command(plant) - signal.nominal,
+        dead_zone=found[0] if found else None,
+        smooth_v=smooth_v,
+    )
