@@ -6,8 +6,10 @@ from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from math import inf
 from pathlib import Path
 
+from workbench.effect import Parameter
 from workbench.effects import CATALOGUE
 from workbench.errors import InputError, Message, listed
 from workbench.plant import Plant
@@ -19,7 +21,6 @@ from workbench.units import (
     STANDARD_ATMOSPHERE_PA,
     UnitError,
     deviation,
-    display_unit,
     public_name,
     quantity,
     written,
@@ -217,14 +218,19 @@ def _values(text: RigText, plant: Plant, removed: tuple[str, ...]) -> dict[str, 
                 continue
             known = plant.parameters[full]
             if not known.lower <= values[full] <= known.upper:
-                low, high = (written(x, full).split(" ")[0] for x in (known.lower, known.upper))
-                bounds = f"{low} to {high} {display_unit(full)}".strip()
-                text.wrong(place, f"{section[key]} is out of bounds", expected=bounds)
+                text.wrong(place, f"{section[key]} is out of bounds", expected=_bounds(known, full))
             elif full in absent:
                 text.wrong(place, f"has a value, but [effects] removes {absent[full]}")
             elif full == AMBIENT:
                 ambient_pa = values[full]
     return values
+
+
+def _bounds(known: Parameter, full: str) -> str:
+    """From where to where a parameter may lie."""
+    if known.upper == inf:
+        return f"at least {written(known.lower, full)}"
+    return f"{written(known.lower, full).split(' ')[0]} to {written(known.upper, full)}"
 
 
 def _known(

@@ -13,8 +13,8 @@ from workbench.reading.table import RecordingWarning
 from workbench.units import display_unit, public_name, scale, si_unit, suffix
 
 LIMITS = {
-    # suffix: least that the largest value must reach, the largest it may have, both in SI
-    "pa": (1e3, 1.2e7),
+    # suffix: what the largest size of a value must reach, and may not pass, in SI
+    "pa": (5e4, 4e6),
     "m": (0.0, 20.0),
     "m_s": (0.0, 200.0),
     "rad": (0.0, 30.0),
@@ -22,15 +22,17 @@ LIMITS = {
     "k": (100.0, 2e3),
 }
 USUAL = {
-    # suffix: the range of ordinary values in SI, and the units in which people log them
-    "pa": (5e4, 3e6, ("bar", "kPa", "psi", "mbar", "MPa", "Pa")),
+    # suffix: the range of an ordinary largest value in SI, and the units in which people log it
+    "pa": (9e4, 3e6, ("bar", "kPa", "psi", "mbar", "MPa", "Pa")),
     "m": (1e-3, 3.0, ("mm", "cm", "um", "m")),
-    "m_s": (1e-3, 10.0, ("mm/s", "m/s")),
+    "m_s": (1e-2, 10.0, ("mm/s", "m/s")),
     "rad": (1e-2, 12.0, ("deg", "rad", "mrad")),
     "v": (1e-2, 12.0, ("mV", "V")),
     "n": (0.1, 2e4, ("N", "kN", "mN")),
     "k": (230.0, 600.0, ("K", "degC")),
 }
+LEAST_GAUGE_PA = 1e3  # a gauge pressure that never gets this far is no recording of a pressure
+VACUUM_PA = 1e3  # an absolute pressure below this is one that counts from ambient
 BEYOND = 1.5  # of the range of a command: more cannot be that command
 RUN = 50  # equal values in a row that make a sensor suspect, where it usually changes
 LIVELY = 0.2  # share of unchanged samples below which a channel usually changes
@@ -41,32 +43,31 @@ def cannot_be(
 ) -> Message | None:
     """What makes these values impossible in their unit, with the unit they look like."""
     low, high = float(np.nanmin(si)), float(np.nanmax(si))
+    size, kind = max(abs(low), abs(high)), public_name(name)
     least, most = LIMITS.get(suffix(name), (0.0, np.inf))
     for signal in plant.commands:
         if signal.name == name and np.isfinite(signal.upper):
             most = BEYOND * max(abs(signal.upper), abs(signal.lower))
-    kind = public_name(name)
-    size = max(abs(low), abs(high))
-    if si_unit(name) == "Pa" and low < -100.0 and size >= least:
+    if unit.endswith("_gauge"):
+        low = VACUUM_PA  # below ambient is no wonder
+        least, size = LEAST_GAUGE_PA, float(np.nanmax(np.abs(raw))) * scale(unit, name).factor
+    if not least <= size <= most:
+        seen = f"values between {np.nanmin(raw):.4g} and {np.nanmax(raw):.4g}"
+        other = _looks_like(name, raw, unit)
+        hint = f" look like {other}" if other else " cannot be"
+        return Message(seen + hint, kind, f"another unit than '{unit}'", file=file)
+    if si_unit(name) == "Pa" and low < VACUUM_PA:
         what = f"an absolute pressure of {low / 1e5:.3g} bar cannot be"
-        plain = unit.removesuffix("_gauge")
-        return Message(what, kind, f"'{plain}_gauge' if it counts from ambient", file=file)
-    if least <= size <= most:
-        return None
-    seen = f"values between {np.nanmin(raw):.4g} and {np.nanmax(raw):.4g}"
-    other = _looks_like(name, raw, unit)
-    hint = f" look like {other}" if other else f" cannot be in {unit or 'this channel'}"
-    return Message(seen + hint, kind, f"another unit than '{unit}'", file=file)
+        return Message(what, kind, f"'{unit}_gauge' if it counts from ambient", file=file)
+    return None
 
 
 def _looks_like(name: str, raw: np.ndarray, unit: str) -> str:
-    """The first usual unit in which these values would be ordinary."""
+    """The usual units in which these values would be ordinary."""
     smallest, largest, units = USUAL.get(suffix(name), (0.0, 0.0, ()))
-    for other in units:
-        top = abs(scale(other, name).to_si(np.nanmax(np.abs(raw))))
-        if other != unit and smallest <= top <= largest:
-            return other
-    return ""
+    size = float(np.nanmax(np.abs(raw)))
+    others = (other for other in units if other != unit)
+    return " or ".join(u for u in others if smallest <= abs(scale(u, name).to_si(size)) <= largest)
 
 
 def warn_of_sensors(channels: Mapping[str, np.ndarray], outputs: set[str], file: str) -> None:

@@ -19,7 +19,7 @@ from workbench.errors import InputError, Message
 from workbench.reading.table import RecordingWarning, Table, open_bytes
 from workbench.recording_format import RecordingFormat
 
-NUMBER = re.compile(r"[-+]?(?:[\d.,']*\d[\d.,']*(?:[eE][-+]?\d+)?|nan|inf)", re.IGNORECASE)
+NUMBER = re.compile(r"[-+]?(?:[\d.]*\d[\d.]*(?:e[-+]?\d+)?|nan|inf)", re.IGNORECASE)
 COMMA_NUMBER = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?|[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
 MISSING = {"", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--"}
 LOOKED_AT = 50  # lines that decide on separator and decimal sign
@@ -115,8 +115,8 @@ def plain_numbers(lines: list[str], separator: str, reader: RecordingFormat) -> 
 
 def _numeric(text: str) -> bool:
     """True when the first cell of a row is a number."""
-    words = re.split(r"[;\t| ]+", text.strip().strip('"'))
-    return bool(words[0]) and bool(NUMBER.fullmatch(words[0].rstrip(",")))
+    first = re.split(r"[;,\t| ]+", text.strip().strip('"'))[0]
+    return bool(NUMBER.fullmatch(first.strip('"')))
 
 
 def _cells(line: str, separator: str) -> list[str]:
