@@ -89,7 +89,8 @@ Received = Callable[[str], list[Term]]
 class State:
     """A state a part or an effect brings with it; ``scale`` is a typical size for the solvers.
 
-    ``tolerance`` is the error of one step that the integrator lets pass, in the state's unit.
+    ``tolerance`` is the error of one step that the integrator lets pass, in the state's unit; none
+    where an error shows in other states as soon as it matters.
     """
 
     quantity: str

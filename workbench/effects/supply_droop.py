@@ -51,7 +51,7 @@ class SupplyDroop(Effect):
     refill_time_s: Expression = form(0.1, lower=5e-3, upper=10.0)
 
     def states(self) -> Iterator[State]:
-        yield State("delivered_kg_s", initial=0.0, scale=1e-3, tolerance=2e-6)
+        yield State("delivered_kg_s", initial=0.0, scale=1e-3)
 
     def alter(self, signal: str, value: Expression, now: Conditions) -> Expression:
         if signal != self.produces:

@@ -81,7 +81,7 @@ class ValveLag(Effect):
     shortest_s: Expression = form(0.5e-3, lower=1e-4, upper=1e-2)
 
     def states(self) -> Iterator[State]:
-        yield State("lagged_v", initial=self.initial_v, scale=1.0, tolerance=1e-2)
+        yield State("lagged_v", initial=self.initial_v, scale=1.0)
 
     def guess(self, seen: Mapping[str, np.ndarray]) -> dict[str, tuple[np.ndarray | float, float]]:
         return {"lagged_v": (seen[self.signal], 0.1)} if self.signal in seen else {}
