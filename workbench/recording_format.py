@@ -78,8 +78,11 @@ def optional_channels(plant: Plant) -> set[str]:
 
 
 def default_format(plant: Plant) -> RecordingFormat:
-    """Columns named like the channels, in the units people read: as recordings are written."""
-    optional = optional_channels(plant) | derived_channels(plant).keys()
+    """Columns named like the channels, in the units people read: as recordings are written.
+
+    A recording may lack any output.
+    """
+    optional = optional_channels(plant) | derived_channels(plant).keys() | {*plant.measured}
     channels = {
         full: ChannelFormat(public, display_unit(full), optional=full in optional)
         for public, full in channel_names(plant).items()

@@ -215,7 +215,7 @@ def written(value: float, name: str) -> str:
     A value that the display unit cannot hold to the last bit is written in SI.
     """
     if not display_unit(name):
-        return repr(float(value))
+        return repr(float(value)).removesuffix(".0")
     shown = display_scale(name)
     number = Decimal(repr(float(value))) * Decimal(shown.divisor) / Decimal(shown.multiplier)
     number = number.normalize(Context(prec=17))

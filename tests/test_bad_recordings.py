@@ -1,0 +1,101 @@
+"""Bad recordings: one clear message each, with the place and what was expected."""
+
+import pytest
+from recording_files import RIG, N, read, refused, table, text
+
+from workbench.errors import InputError
+from workbench.reading import RecordingWarning, read_recording
+from workbench.rig import load_rig
+
+
+def _cell(row: int, column: int, value: str):
+    def change(content: str) -> str:
+        lines = content.splitlines()
+        cells = lines[row].split(",")
+        lines[row] = ",".join([*cells[:column], value, *cells[column + 1 :]])
+        return "\n".join(lines)
+
+    return change
+
+
+BAD = {
+    "empty file": (lambda s: " \n", "", "run.csv: the file is empty"),
+    "names only": (lambda s: s.split("\n")[0], "", "no rows of numbers"),
+    "no names": (lambda s: s.split("\n", 1)[1], "", "run.csv:1: the first row holds numbers"),
+    "missing column": (
+        lambda s: s.replace("position_mm", "positionmm"),
+        "",
+        "slide.position: no column 'position_mm'; expected one of time_s, command_V, "
+        "pressure_a_bar, positionmm; did you mean 'positionmm'?",
+    ),
+    "column twice": (lambda s: s.replace("position_mm", "command_V"), "", "2 columns are called"),
+    "another plant": (
+        lambda s: s.replace("_", "-").replace("time-s", "time_s"),
+        "",
+        "is it a recording of another plant?",
+    ),
+    "text": (_cell(9, 2, "abc"), "", "run.csv:10: 'abc' in column 3 is not a number"),
+    "short row": (lambda s: s.replace("\n0.1,", "\n0.1\n0.1,"), "", "this row has 1 columns"),
+    "backwards": (_cell(9, 0, "0.003"), "", "runs backwards at line 10: 0.003 s after 0.007 s"),
+    "standing": (_cell(9, 0, "0.007"), "", "time stands still at line 10"),
+    "no time": (_cell(9, 0, "nan"), "", "no time at line 10"),
+    "input missing": (_cell(9, 1, "nan"), "", "1 samples are missing from line 10 on"),
+    "too short": (lambda s: "\n".join(s.splitlines()[:9]), "", "are fewer than the"),
+    "beyond skip": (lambda s: s, "skip = 1000", "no rows after the first 1000"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_files_get_one_clear_message(tmp_path, case):
+    change, section, message = BAD[case]
+
+    assert message in refused(tmp_path, change(text(table())), section)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"bar": "Pa"}, "chamber_a.pressure: values between 3.998 and 6 look like bar"),
+        ({"mm": "m"}, "slide.position: values between 140 and 230 look like mm"),
+        ({"bar": "bar_gauge"}, None),
+        ({"bar": "Pa_gauge"}, "look like bar"),
+    ],
+)
+def test_a_unit_that_cannot_be_is_refused(tmp_path, change, message):
+    ((old, new),) = change.items()
+    rig = RIG.replace(f'unit = "{old}"', f'unit = "{new}"')
+    content = text(table())
+
+    if message is None:
+        assert len(read(tmp_path, content, rig=rig)) == N
+    else:
+        assert message in refused(tmp_path, content, rig=rig)
+
+
+def test_gauge_pressures_read_as_absolute_are_refused(tmp_path):
+    rows = table()
+    rows[:, 2] -= 5.0
+
+    assert "cannot be; expected 'bar_gauge'" in refused(tmp_path, text(rows))
+
+
+def test_an_output_that_never_changes_is_refused(tmp_path):
+    rows = table()
+    rows[:, 3] = 145.0
+
+    assert "slide.position: is 145 mm in all 400 samples" in refused(tmp_path, text(rows))
+
+
+def test_a_sensor_that_sticks_or_saturates_is_warned_of(tmp_path):
+    rows = table()
+    rows[100:200, 2] = rows[:, 2].max()
+
+    with pytest.warns(RecordingWarning, match=r"chamber_a\.pressure: saturated at 6\.0"):
+        read(tmp_path, text(rows))
+
+
+def test_a_file_that_is_not_there_names_its_neighbour(tmp_path):
+    (tmp_path / "run1.csv").write_text("x")
+
+    with pytest.raises(InputError, match=r"no such file; did you mean 'run1\.csv'"):
+        read_recording(load_rig(RIG), tmp_path / "run2.csv")

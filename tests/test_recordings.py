@@ -1,0 +1,192 @@
+"""Recordings from files: every dialect gives the same channels, bad input one clear message."""
+
+import time
+from dataclasses import replace
+
+import h5py
+import numpy as np
+import pytest
+import scipy.io
+from recording_files import FACTORS, FULL, NAMES, RIG, N, read, refused, table, text
+
+from workbench.differentiator import derivative
+from workbench.errors import InputError
+from workbench.reading import RecordingWarning, read_recording, write_recording
+from workbench.recording import Recording
+from workbench.rig import default_rig, load_rig
+
+
+def assert_same(recording: Recording, rows: np.ndarray) -> None:
+    assert recording.sample_time_s == 1e-3
+    for name, column, factor in zip(FULL, rows.T[1:], FACTORS, strict=True):
+        assert recording[name] == pytest.approx(factor * column, rel=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("separator", "change"),
+    [
+        (",", lambda s: s),
+        (", ", lambda s: s),
+        (";", lambda s: s.replace(".", ",")),
+        ("\t", lambda s: s.replace(".", ",")),
+        ("  ", lambda s: s.replace(".", ",")),
+        (" ", lambda s: s),
+        ("|", lambda s: s),
+        (",", lambda s: s.replace("\n", "\ns,V,bar,mm\n", 1)),
+        (",", lambda s: "# logged by hand\n\n" + s),
+        (",", lambda s: "# " + s),
+        (",", lambda s: s.replace("\n", "\r\n")),
+        (",", lambda s: "\ufeff" + s),
+        (",", lambda s: s.replace("time_s", '"time_s"')),
+    ],
+)
+def test_every_dialect_of_csv_gives_the_same_channels(tmp_path, separator, change):
+    rows = table()
+
+    recording = read(tmp_path, change(text(rows, separator)))
+
+    assert_same(recording, rows)
+    assert recording.noise == {"chamber_a.pressure_pa": 400.0}
+
+
+def test_columns_may_be_numbers_of_a_file_without_names(tmp_path):
+    rig = RIG
+    for number, name in enumerate(NAMES, start=1):
+        rig = rig.replace(f'"{name}"', str(number))
+    rows = table()
+    content = "logger 3\nsecond line\n" + text(rows, "\t").split("\n", 1)[1]
+
+    assert_same(read(tmp_path, content, "header = false\nskip = 2", rig), rows)
+
+
+def test_a_thousands_point_beside_a_decimal_point(tmp_path):
+    rows = table(2000) * [1e3, 1, 1, 1]
+    lines = [f"{t:,.3f}".replace(",", ".") + f";{u:.9g};{p:.9g};{x:.9g}" for t, u, p, x in rows]
+    rig = RIG.replace('unit = "s"', 'unit = "ms"')
+
+    recording = read(
+        tmp_path, "\n".join([";".join(NAMES), *lines]), 'thousands = "."\ndecimal = "."', rig
+    )
+
+    assert "1.234.000;" in "\n".join(lines)
+    assert_same(recording, rows)
+
+
+@pytest.mark.parametrize("version", ["5", "7.3"])
+def test_matlab_files_of_both_versions_hold_vectors_and_structures(tmp_path, version):
+    rows = table()
+    path = tmp_path / "run.mat"
+    if version == "5":
+        log = {"y": rows[:, 1:3], "x": rows[:, 3:]}
+        scipy.io.savemat(path, {"t": rows[:, 0], "log": log, "note": "hello"})
+    else:
+        with h5py.File(path, "w", userblock_size=512) as file:  # columns first, as MATLAB does
+            file["t"], file["log/y"], file["log/x"] = rows[None, :, 0], rows[:, 1:3].T, rows[:, 3]
+    rig = RIG.replace("time_s", "t").replace("command_V", "log.y(:,1)")
+    rig = rig.replace("pressure_a_bar", "log.y(:,2)").replace("position_mm", "log.x")
+
+    assert_same(read_recording(load_rig(rig), path), rows)
+
+
+def test_a_matlab_object_is_refused_with_the_way_out(tmp_path):
+    path = tmp_path / "run.mat"
+    with h5py.File(path, "w", userblock_size=512) as file:
+        file["ts"] = np.zeros((1, 6), dtype=np.uint32)
+        file["ts"].attrs["MATLAB_class"] = np.bytes_("timeseries")
+        file["ts"].attrs["MATLAB_object_decode"] = np.int32(3)
+
+    with pytest.raises(InputError, match=r"s = struct\('t', ts.Time, 'y', ts.Data\)"):
+        read_recording(load_rig(RIG), path)
+
+
+def test_jitter_is_interpolated_onto_an_even_grid(tmp_path):
+    t = 1e-3 * np.arange(N) + 2e-4 * np.random.default_rng(1).uniform(-1, 1, N)
+    rows = np.column_stack([t, 5 + np.sin(9 * t), 5 + np.cos(9 * t), 140 + 90 * np.sin(5 * t)])
+
+    recording = read(tmp_path, text(rows))
+
+    even = t[0] + recording.time_s
+    assert recording.sample_time_s == pytest.approx(1e-3, rel=1e-2)
+    assert recording["valve.command_v"] == pytest.approx(5 + np.sin(9 * even), abs=1e-4)
+
+
+def test_a_recording_is_resampled_when_asked(tmp_path):
+    recording = read(tmp_path, text(table()), 'resample = "4 ms"')
+
+    assert (recording.sample_time_s, len(recording)) == (4e-3, N // 4)
+
+
+def test_gaps_are_refused_with_their_place_or_split(tmp_path):
+    rows = table()
+    rows[200:, 0] += 2.0
+
+    said = refused(tmp_path, text(rows))
+    split = read(tmp_path, text(rows), 'gaps = "split"')
+
+    assert "1 gap in the time, the longest 2.001 s after line 201" in said
+    assert 'gaps = "split"' in said
+    assert split.starts == (0, 200)
+    assert [len(piece) for piece in split.pieces] == [200, 200]
+
+
+def test_missing_samples_of_an_output_stay_missing(tmp_path):
+    lines = text(table()).splitlines()
+    for number in range(51, 71):
+        cells = lines[number].split(",")
+        lines[number] = ",".join([*cells[:3], "" if number % 2 else "NaN"])
+
+    recording = read(tmp_path, "\n".join(lines))
+
+    assert np.flatnonzero(np.isnan(recording["slide.position_m"])).tolist() == list(range(50, 70))
+
+
+def test_a_row_that_was_not_finished_is_left_out(tmp_path):
+    with pytest.warns(RecordingWarning, match=r"run\.csv:401: unfinished row left out"):
+        recording = read(tmp_path, text(table())[:-20])
+
+    assert len(recording) == N - 1
+
+
+def test_a_written_recording_reads_back(tmp_path):
+    rows = table()
+    first = read(tmp_path, text(rows))
+
+    write_recording(first, tmp_path / "out.csv", {"slide.position": "m"})
+    assert (tmp_path / "out.csv").read_text().splitlines()[:2] == [
+        "time,valve.command,chamber_a.pressure,slide.position",
+        "s,V,bar,m",
+    ]
+
+    write_recording(first, tmp_path / "out.csv")
+    assert_same(read_recording(default_rig("servo_drive"), tmp_path / "out.csv"), rows)
+
+
+def test_written_pieces_are_found_again(tmp_path):
+    rows = table()
+    whole = Recording("r", 1e-3, dict(zip(FULL, (rows[:, 1:] * FACTORS).T, strict=True)))
+    cut = replace(whole, starts=(0, 150, 300))
+
+    write_recording(cut, tmp_path / "out.csv")
+    rig = load_rig('plant = "servo_drive"\n[recording]\ntime = {column = "time", unit = "s"}\n'
+                   'gaps = "split"\n')  # fmt: skip
+
+    assert read_recording(rig, tmp_path / "out.csv").starts == cut.starts
+
+
+def test_ten_seconds_at_a_kilohertz_are_read_at_once(tmp_path):
+    content = text(table(10_000))
+    read(tmp_path, content)
+
+    started = time.perf_counter()
+    read(tmp_path, content)
+
+    assert time.perf_counter() - started < 0.3  # 0.04 s on an idle machine
+
+
+def test_the_differentiator_is_exact_on_a_parabola_and_stays_inside_pieces():
+    t = 0.01 * np.arange(40)
+    position = np.concatenate([3 * t**2, 5 + 0 * t])
+
+    speed = derivative(position, 0.01, starts=(0, 40))
+
+    assert speed == pytest.approx(np.concatenate([6 * t, 0 * t]), abs=1e-10)
