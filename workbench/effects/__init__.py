@@ -5,7 +5,6 @@ from workbench.effects.five_port_valve import FivePortValve
 from workbench.effects.forces import ConstantForce, EndCushion, EndStops, SpringForce, Weight
 from workbench.effects.leaks import ChamberLeak, PistonLeak
 from workbench.effects.sensor_offset import (
-    ForceSensorOffset,
     PositionSensorOffset,
     PressureSensorOffset,
 )
@@ -23,7 +22,6 @@ CATALOGUE = (
     EndCushion,
     EndStops,
     FivePortValve,
-    ForceSensorOffset,
     PistonLeak,
     PositionSensorOffset,
     PressureSensorOffset,

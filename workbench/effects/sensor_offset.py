@@ -1,4 +1,7 @@
-"""Sensors that read too much or too little by a constant."""
+"""Sensors that read too much or too little by a constant.
+
+There is none for forces: an offset of a force sensor is what :class:`ConstantForce` is.
+"""
 
 from __future__ import annotations
 
@@ -39,16 +42,3 @@ class PositionSensorOffset(Effect):
 
     def alter(self, signal: str, value: Expression, now: Conditions) -> Expression:
         return value + self.offset_m if signal == self.signal else value
-
-
-@dataclass(frozen=True, kw_only=True)
-class ForceSensorOffset(Effect):
-    """y = F + e.  Source: physics.md section 6 (adc bias)."""
-
-    causes = (Cause(strength="offset_n", **CAUSE),)
-
-    signal: str
-    offset_n: Expression = strength(typical=20.0, lower=-500.0, upper=500.0)
-
-    def alter(self, signal: str, value: Expression, now: Conditions) -> Expression:
-        return value + self.offset_n if signal == self.signal else value
