@@ -12,6 +12,16 @@ from linearize.modes import HybridModel, Mode
 from linearize.standard import POSITION, VELOCITY
 from workbench.contracts import Command, Estimate
 
+CALM = PositioningSpec(
+    approach_m=0.3,
+    band_m=1e-4,
+    leave_m=1.9e-4,
+    integrate_m=5e-4,
+    stuck_factor=2.0,
+    stribeck_share=0.0,
+)
+"""Without feedback of the pressures a slide that breaks away is caught late: integrate gently."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class PidSpec:
@@ -30,13 +40,11 @@ class PidSpec:
     """
 
     sample_time_s: float = 1e-3
-    stiffening: float = 1.6
-    share_of_limit: float = 0.3
-    integral_time_s: float = 0.5
+    stiffening: float = 6.0
+    share_of_limit: float = 0.15
+    integral_time_s: float = 1.0
     filter_s: float = 2e-3
-    positioning: PositioningSpec = field(
-        default_factory=lambda: PositioningSpec(approach_m=0.3, stribeck_share=0.0)
-    )
+    positioning: PositioningSpec = field(default_factory=lambda: CALM)
 
 
 @dataclass(frozen=True)

@@ -103,6 +103,7 @@ class Task:
     ahead         1 forward, 0 backward
     rests         the valve stays shut
     rate_m        what the integral grows by per second
+    rise_n        friction above Coulomb's that the target pressures overcome
     """
 
     x: np.ndarray
@@ -113,6 +114,7 @@ class Task:
     ahead: float
     rests: bool
     rate_m: float
+    rise_n: float
 
     @property
     def deviation(self) -> np.ndarray:
@@ -143,13 +145,13 @@ class Positioning:
         steady = sum(
             w * (s.level + s.slope * speed_m_s) for w, s in self.steady.weighted(x[0], ahead)
         )
-        rise_pa = self._stribeck_n(x[1]) * (2.0 * ahead - 1.0) / (2.0 * self.area_m2)
+        rise_n = self._stribeck_n(x[1]) * (2.0 * ahead - 1.0)
+        rise_pa = rise_n / (2.0 * self.area_m2)
         near = x[0] - np.clip(error_m, -spec.approach_m, spec.approach_m)
         target = np.array([near, speed_m_s, steady[0] + rise_pa, steady[1] - rise_pa])
         rests = self._rests(memory, error_m, x[1], speed_m_s)
-        return Task(
-            x, target, steady[2], error_m, speed_m_s, ahead, rests, self._rate_m(error_m, x[1])
-        )
+        rate_m = self._rate_m(error_m, x[1])
+        return Task(x, target, steady[2], error_m, speed_m_s, ahead, rests, rate_m, rise_n)
 
     def _rests(self, memory: Memory, error_m: float, v_m_s: float, speed_m_s: float) -> bool:
         spec = self.spec

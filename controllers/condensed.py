@@ -1,0 +1,213 @@
+"""The condensed quadratic program of linear MPC on one mode; see :mod:`controllers.linear_mpc`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.linalg import solve_discrete_are
+
+from controllers.positioning import STATES, PositioningSpec
+from linearize.discrete import sampled
+from linearize.modes import Mode
+from linearize.standard import PRESSURES, VELOCITY
+
+if TYPE_CHECKING:
+    import osqp
+
+LIMITED = (0, 2, 3)  # position and pressures, of STATES
+SLACK_UNIT = np.array([1e-3, 1e4, 1e4])  # m, Pa, Pa: violations that cost alike
+SETTINGS = {
+    "eps_abs": 1e-5,
+    "eps_rel": 1e-5,
+    "polishing": True,
+    "warm_starting": True,
+    "max_iter": 2000,
+    "verbose": False,
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class MpcSpec:
+    """Tolerable deviations, each worth a cost of one, horizon, limits and clock.
+
+    Attributes
+    ----------
+    move_v
+        Tolerable change of the opening from sample to sample.
+    force_n_m_s
+        Force by which the target pressures shift per integral of the position error.
+    margin_m
+        The position stays this far from the end stops.
+    lowest_pa, highest_pa
+        Soft limits of the pressures.
+    slack_weight
+        Cost of violating a limit by 1 mm or 0.1 bar at one sample.
+    """
+
+    sample_time_s: float = 2e-3
+    horizon: int = 20
+    position_m: float = 1e-3
+    velocity_m_s: float = 0.1
+    pressure_pa: float = 1e6
+    opening_v: float = 0.3
+    move_v: float = 3.0
+    force_n_m_s: float = 5e4
+    margin_m: float = 2e-3
+    lowest_pa: float = 1.2e5
+    highest_pa: float = 6.9e5
+    slack_weight: float = 1e3
+    positioning: PositioningSpec = field(default_factory=PositioningSpec)
+
+
+@dataclass(frozen=True)
+class Program:
+    """The quadratic program of one mode: min z'Hz/2 + g'z, lower <= rows z <= upper.
+
+    z holds the N openings and one slack per limited state.  Stacked predictions are
+    X = free x + forced U + drift + pushed f, with X of shape (4 N,) and a force f on the slide.
+
+    H, rows             shapes (n_z, n_z) and (n_c, n_z)
+    free, forced        shapes (4 N, 4) and (4 N, N)
+    drift, pushed       shapes (4 N,)
+    Q                   cost of the stacked states, shape (4 N, 4 N)
+    state_limits        lower and upper of the limited states over the horizon in units of the
+                        slack, shape (2, 3 N)
+    openings            smallest and largest opening
+    """
+
+    H: np.ndarray
+    rows: np.ndarray
+    free: np.ndarray
+    forced: np.ndarray
+    drift: np.ndarray
+    pushed: np.ndarray
+    Q: np.ndarray
+    R: float
+    S: float
+    state_limits: np.ndarray
+    openings: tuple[float, float]
+
+    @property
+    def horizon(self) -> int:
+        return self.forced.shape[1]
+
+    def unforced(self, x: np.ndarray, force_n: float) -> np.ndarray:
+        """Stacked states under zero openings, shape (4 N,)."""
+        return self.free @ x + self.drift + self.pushed * force_n
+
+    def gradient(
+        self, unforced: np.ndarray, targets: np.ndarray, steady_v: float, last_v: float
+    ) -> np.ndarray:
+        """G for stacked targets (4 N,), the steady opening and the last one."""
+        g = np.zeros(len(self.H))
+        pull = self.forced.T @ (self.Q @ (unforced - targets))
+        g[: self.horizon] = 2.0 * (pull - self.R * steady_v)
+        g[0] -= 2.0 * self.S * last_v
+        return g
+
+    def bounds(self, unforced: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper side of the rows: openings, limited states twice, slacks."""
+        n = self.horizon
+        at = (unforced.reshape(n, -1)[:, LIMITED] / SLACK_UNIT).ravel()
+        low, high = self.state_limits
+        none = np.full(len(at), np.inf)
+        lower = [np.full(n, self.openings[0]), low - at, -none, np.zeros(len(LIMITED))]
+        upper = [np.full(n, self.openings[1]), none, high - at, np.full(len(LIMITED), np.inf)]
+        return np.concatenate(lower), np.concatenate(upper)
+
+    @cached_property
+    def inverse(self) -> np.ndarray:
+        """Inverse of H, for the optimum without limits."""
+        return np.linalg.inv(self.H)
+
+    @cached_property
+    def solver(self) -> osqp.OSQP:
+        """OSQP, set up once; gradient and bounds are updated, and every solve is started by us."""
+        import osqp
+
+        solver = osqp.OSQP()
+        size, rows = len(self.H), len(self.rows)
+        solver.setup(
+            sp.csc_matrix(np.triu(self.H)),
+            np.zeros(size),
+            sp.csc_matrix(self.rows),
+            np.full(rows, -1.0),
+            np.full(rows, 1.0),
+            **SETTINGS,
+        )
+        return solver
+
+
+def program_of(
+    mode: Mode,
+    spec: MpcSpec,
+    centre_v: float,
+    area_m2: float,
+    stroke_m: float,
+    openings: tuple[float, float],
+) -> Program:
+    """The condensed program of a mode."""
+    small, n, N = sampled(mode, spec.sample_time_s), len(STATES), spec.horizon
+    tolerable = np.array([spec.position_m, spec.velocity_m_s, spec.pressure_pa, spec.pressure_pa])
+    Q, R, S = np.diag(tolerable**-2.0), spec.opening_v**-2.0, spec.move_v**-2.0
+    scale = mode.scale
+    to_go = solve_discrete_are(
+        small.F * scale / scale[:, None],
+        small.G / scale[:, None],
+        Q * np.outer(scale, scale),
+        np.array([[R]]),
+    ) / np.outer(scale, scale)
+    offset = small.offset + small.G[:, 0] * centre_v
+    free, forced, drift = stacked(small.F, small.G, offset, N)
+    push = sampled(pushed_mode(mode, area_m2), spec.sample_time_s).offset - small.offset
+    _, _, pushed = stacked(small.F, small.G, push, N)
+    stages = sp.block_diag([Q] * (N - 1) + [to_go]).toarray()
+    moves = np.eye(N) - np.eye(N, k=-1)
+    H = np.zeros((N + len(LIMITED),) * 2)
+    H[:N, :N] = 2.0 * (forced.T @ stages @ forced + R * np.eye(N) + S * moves.T @ moves)
+    H[N:, N:] = 2.0 * spec.slack_weight * np.eye(len(LIMITED))
+    seen = (forced.reshape(N, n, N)[:, LIMITED] / SLACK_UNIT[:, None]).reshape(-1, N)
+    slack = np.tile(np.eye(len(LIMITED)), (N, 1))
+    rows = np.block(
+        [
+            [np.eye(N), np.zeros((N, len(LIMITED)))],
+            [seen, slack],
+            [seen, -slack],
+            [np.zeros((len(LIMITED), N)), np.eye(len(LIMITED))],
+        ]
+    )
+    low = np.tile([spec.margin_m, spec.lowest_pa, spec.lowest_pa] / SLACK_UNIT, N)
+    top_m = stroke_m - spec.margin_m
+    high = np.tile([top_m, spec.highest_pa, spec.highest_pa] / SLACK_UNIT, N)
+    limits = np.array([low, high])
+    return Program(H, rows, free, forced, drift, pushed, stages, R, S, limits, openings)
+
+
+def pushed_mode(mode: Mode, area_m2: float) -> Mode:
+    """The mode with a force of 1 N on the slide: as much as 1 / area of pressure a."""
+    v, pressure = (mode.state_names.index(name) for name in (VELOCITY, PRESSURES[0]))
+    more = np.zeros(len(mode.drift))
+    more[v] = mode.A[v, pressure] / area_m2
+    return replace(mode, drift=mode.drift + more)
+
+
+def stacked(
+    F: np.ndarray, G: np.ndarray, offset: np.ndarray, horizon: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """free, forced, drift of X = (x_1, ..., x_N): shapes (n N, n), (n N, N), (n N,)."""
+    n = len(F)
+    free, forced, drift = np.zeros((horizon, n, n)), np.zeros((horizon, n, horizon)), []
+    power, constant = np.eye(n), np.zeros(n)
+    response = []
+    for i in range(horizon):
+        response.append((power @ G)[:, 0])
+        power, constant = F @ power, F @ constant + offset
+        free[i] = power
+        drift.append(constant)
+        for j in range(i + 1):
+            forced[i, :, j] = response[i - j]
+    return free.reshape(-1, n), forced.reshape(-1, horizon), np.concatenate(drift)
