@@ -182,6 +182,44 @@ def test_the_physics_is_one_expression_for_numbers_and_symbols(plant, conditions
     assert np.mean(agree) > 0.999 if agree else not model.states
 
 
+def mass_flow_kg_s(plant, effect, balances, at):
+    """What an effect puts into these balances together, shape (n,)."""
+    flows = plant.model.flows
+    together = sum(flows.get((effect, "MassFlow", balance), 0.0) for balance in balances)
+    n = at.x.shape[1]
+    return ca.Function("flow", [*plant.model.symbols], [together]).map(n)(*at).full().ravel()
+
+
+def test_a_piston_leak_takes_from_one_chamber_what_it_gives_to_the_other(conditions):
+    plant = PLANTS["servo_drive"]().with_values({"piston_leak.area_m2": 5e-7})
+    at, chambers = conditions(plant), ("chamber_a", "chamber_b")
+
+    assert mass_flow_kg_s(plant, "piston_leak", chambers, at) == pytest.approx(0.0, abs=1e-18)
+    assert np.any(mass_flow_kg_s(plant, "piston_leak", chambers[:1], at))
+
+
+def test_what_the_valve_takes_from_the_supply_goes_into_the_chambers_or_out(conditions):
+    """Outside at the pressure of the chambers nothing goes out, and the balance closes."""
+    plant = PLANTS["servo_drive"]()
+    balances = ("supply", "chamber_a", "chamber_b")
+    at = conditions(plant)
+    lost_kg_s = mass_flow_kg_s(plant, "valve", balances, at)
+    pressures = [k for k, name in enumerate(plant.model.states) if name.endswith("pressure_pa")]
+    vented = at.x.copy()
+    vented[pressures] = plant.values["atmosphere.pressure_pa"]
+    closed_kg_s = mass_flow_kg_s(plant, "valve", balances, at._replace(x=vented))
+
+    assert (lost_kg_s < 0).all()
+    assert closed_kg_s == pytest.approx(0.0, abs=1e-17)
+
+
+def test_a_chamber_leak_only_loses_while_the_chamber_is_above_the_atmosphere(conditions):
+    plant = PLANTS["servo_drive"]().with_values({"chamber_leak@chamber_a.area_m2": 3e-7})
+    lost_kg_s = mass_flow_kg_s(plant, "chamber_leak@chamber_a", ("chamber_a",), conditions(plant))
+
+    assert (lost_kg_s < 0).all()
+
+
 def test_a_delayed_command_is_the_command_of_that_long_ago():
     for plant in (build() for build in PLANTS.values()):
         for effect in filter(acts_on_sequences, plant.effects):

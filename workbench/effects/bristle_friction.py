@@ -76,7 +76,7 @@ class BristleFriction(StribeckFriction):
     bristle_time_s: Expression = form(45e-6, lower=0.0, upper=1e-2)
 
     def states(self) -> Iterator[State]:
-        yield State("deflection_m", initial=0.0, scale=2e-5, tolerance=1e-7)
+        yield State("deflection_m", initial=0.0, scale=2e-5, tolerance=1e-8)
 
     def terms(self, now: Conditions) -> Iterator[Force]:
         velocity_m_s, z = now[self.body].velocity_m_s, now[self.name].deflection_m

@@ -1,0 +1,155 @@
+"""Machine code gives what CasADi's virtual machine gives, and is never in the way."""
+
+import logging
+import shutil
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from workbench import compiled as module
+from workbench.compiled import compiled
+
+HAS_COMPILER = any(map(shutil.which, module.COMPILERS))
+needs_compiler = pytest.mark.skipif(not HAS_COMPILER, reason="there is no C compiler here")
+
+
+@pytest.fixture
+def cache(tmp_path, monkeypatch):
+    """An empty cache folder, and nothing remembered of compilers."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.delenv("WORKBENCH_NO_COMPILER", raising=False)
+    remembered = (module._compiler, module._folder)
+    for function in remembered:
+        function.cache_clear()
+    yield tmp_path / "workbench" / "compiled"
+    for function in remembered:
+        function.cache_clear()
+
+
+def small(name="small", scale=2.0):
+    x = ca.MX.sym("x", 3)
+    return ca.Function(name, [x], [scale * ca.sin(x)], ["x"], ["y"])
+
+
+def machine_code(function):
+    return function.class_name() == "External"
+
+
+@needs_compiler
+def test_the_compiled_step_is_equal_to_the_last_bit(drive):
+    n, p = 300, drive.nominal[2]
+    command = np.linspace(2.0, 8.0, n)[None]
+    runs = [
+        step.mapaccum(n)(drive.initial, command, np.zeros((0, n)), p).full()
+        for step in (drive.model.step(1e-3), drive.model.compiled_step(1e-3))
+    ]
+
+    assert machine_code(drive.model.compiled_step(1e-3))
+    np.testing.assert_array_equal(*runs)
+
+
+@needs_compiler
+def test_the_compiled_step_keeps_its_names(drive):
+    step, fast = drive.model.step(1e-3), drive.model.compiled_step(1e-3)
+
+    assert (fast.name_in(), fast.name_out()) == (step.name_in(), step.name_out())
+    assert [fast.size_in(k) for k in range(4)] == [step.size_in(k) for k in range(4)]
+
+
+@needs_compiler
+def test_two_threads_do_not_disturb_each_other(drive):
+    step, n, p = drive.model.compiled_step(1e-3), 64, drive.nominal[2]
+    x = drive.initial[:, None] + np.zeros((1, n))
+    u, d = np.linspace(0.0, 10.0, n)[None], np.zeros((0, n))
+    alone, together = step.map(n), step.map(n, "thread", 2)
+    expected = alone(x, u, d, p).full()
+    with ThreadPoolExecutor(2) as pool:
+        results = [*pool.map(lambda _: together(x, u, d, p).full(), range(20))]
+
+    for result in results:
+        np.testing.assert_array_equal(result, expected)
+
+
+@needs_compiler
+def test_a_library_is_compiled_once_and_found_again(cache):
+    compiled(small())
+    (library,) = cache.iterdir()
+    made = library.stat().st_mtime_ns
+    again = compiled(small())
+
+    assert machine_code(again)
+    assert [path.stat().st_mtime_ns for path in cache.iterdir()] == [made]
+
+
+@needs_compiler
+def test_functions_of_one_name_are_not_mixed_up(cache):
+    twice, thrice = compiled(small(scale=2.0)), compiled(small(scale=3.0))
+
+    np.testing.assert_allclose(thrice(1.0).full(), 1.5 * twice(1.0).full())
+
+
+@needs_compiler
+def test_processes_that_compile_the_same_at_once_all_get_it(cache):
+    script = (
+        "import casadi as ca; from workbench.compiled import compiled; x = ca.MX.sym('x');"
+        "print(compiled(ca.Function('together', [x], [ca.cos(x)])).class_name())"
+    )
+    command = [sys.executable, "-c", script]
+    processes = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(4)]
+
+    assert [process.communicate()[0].strip() for process in processes] == ["External"] * 4
+    assert len([*cache.iterdir()]) == 1
+
+
+def test_without_a_compiler_one_line_says_so_and_the_function_serves_itself(
+    cache, monkeypatch, caplog
+):
+    monkeypatch.setattr(module.shutil, "which", lambda command: None)
+    function = small()
+    with caplog.at_level(logging.INFO, logger="workbench"):
+        results = [compiled(function) for _ in range(3)]
+
+    assert results == [function] * 3
+    assert len(caplog.records) == 1
+    assert "no C compiler is found" in caplog.text
+
+
+def test_the_compiler_can_be_forbidden(cache, monkeypatch):
+    monkeypatch.setenv("WORKBENCH_NO_COMPILER", "1")
+
+    assert not machine_code(compiled(small()))
+
+
+@pytest.mark.skipif(not shutil.which("false"), reason="there is no command that always fails")
+def test_a_broken_compiler_costs_a_warning_and_nothing_else(cache, monkeypatch, caplog):
+    monkeypatch.setenv("CC", "false")
+    function = small()
+
+    assert compiled(function) is function
+    assert "small is not compiled" in caplog.text
+    np.testing.assert_allclose(function(1.0).full(), 2.0 * np.sin(1.0))
+
+
+@needs_compiler
+def test_a_compiled_function_inside_another_is_refused_when_compiling_not_when_called(
+    cache, caplog
+):
+    """Its C code would call a symbol that is not there."""
+    x = ca.MX.sym("x", 3)
+    outer = ca.Function("outer", [x], [compiled(small())(x) + 1.0])
+
+    assert compiled(outer) is outer
+    assert "outer is not compiled" in caplog.text
+
+
+@needs_compiler
+def test_a_folder_that_cannot_be_written_is_not_in_the_way(cache, monkeypatch, tmp_path):
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+
+    assert machine_code(compiled(small()))
