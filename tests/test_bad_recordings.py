@@ -20,6 +20,7 @@ def _cell(row: int, column: int, value: str):
 
 BAD = {
     "empty file": (lambda s: " \n", "", "run.csv: the file is empty"),
+    "no text": (lambda s: "PK\3\4\0\0" + s, "", "is no text; expected a CSV or MAT file"),
     "names only": (lambda s: s.split("\n")[0], "", "no rows of numbers"),
     "no names": (lambda s: s.split("\n", 1)[1], "", "run.csv:1: the first row holds numbers"),
     "missing column": (

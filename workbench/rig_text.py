@@ -77,7 +77,7 @@ class RigText:
         """What stands at a place, of this type; ``default`` where nothing does, or another type."""
         found: Any = self.tree
         for key in place:
-            if key not in found:
+            if not isinstance(found, dict) or key not in found:
                 return default
             found = found[key]
         if isinstance(found, kind) and not (kind is int and isinstance(found, bool)):

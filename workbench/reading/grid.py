@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -147,9 +147,9 @@ def _held(grid: np.ndarray, time_s: np.ndarray, values: np.ndarray) -> np.ndarra
     return values[np.clip(np.searchsorted(time_s, grid, side="right") - 1, 0, None)]
 
 
-def missing_stretch(values: Mapping[str, np.ndarray], name: str) -> tuple[int, int] | None:
-    """First row and length of the first stretch of NaN in a channel, if there is one."""
-    missing = ~np.isfinite(values[name])
+def missing_stretch(values: np.ndarray) -> tuple[int, int] | None:
+    """First row and length of the first stretch of NaN, if there is one."""
+    missing = ~np.isfinite(values)
     if not missing.any():
         return None
     first = int(missing.argmax())

@@ -140,7 +140,7 @@ def _in_si(rig: Rig, table: Table, raw: dict[str, np.ndarray]) -> dict[str, np.n
 
 def _missing(plant: Plant, table: Table, found: dict[str, np.ndarray], name: str) -> Message | None:
     """What is wrong with the missing samples of a channel: an input must be complete."""
-    stretch = missing_stretch(found, name)
+    stretch = missing_stretch(found[name])
     if stretch is None:
         return None
     first, length = stretch

@@ -34,6 +34,8 @@ def text_table(path: Path, reader: RecordingFormat) -> Table:
         If it holds no rows of numbers, or numbers where names were expected.
     """
     file, lines = str(path), decoded(open_bytes(path)).splitlines()
+    if "\0" in "".join(lines[:3]):
+        raise InputError(Message("is no text", expected="a CSV or MAT file", file=file))
     rows = [
         (number, line)
         for number, line in enumerate(lines, start=1)
