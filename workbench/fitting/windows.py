@@ -6,11 +6,16 @@ second is two or three pressure time constants of a servo drive; where the slide
 windows run across break-aways and are far from linear in anything (diagnosis.md 4.5).
 
 Residuals are divided by a *scale* per output and window.  Sensor noise alone is a poor one: with a
-5 um position sensor a 1 mm error of a model outweighs every pressure.  So the scale is the noise or
-the model's own typical error in that output, whichever is larger, times the square root of the
-correlation time of that error in samples: 10 000 correlated samples are worth a few hundred, and
-counted in full they would push every parameter out of its prior.  Windows that are far worse than
-the typical one (a break-away at the wrong instant) count less (Huber's weights).
+5 um position sensor a 1 mm error of a model outweighs every pressure, and a stroke outweighs the
+quiet second in which a leak shows.  So the scale is
+
+    scale^2 = tau (quiet^2 + (rho activity)^2)
+
+with the activity the standard deviation of the output within the window, quiet and rho the typical
+errors of the model where the output rests (at least the noise) and as a share of the activity where
+it moves, and tau the correlation time of those errors in samples: 10 000 correlated samples are
+worth a few hundred, and counted in full they would push every parameter out of its prior.  Windows
+far worse than that (a break-away at the wrong instant) count no more than one three times worse.
 """
 
 from __future__ import annotations
@@ -30,8 +35,25 @@ from workbench.simulation import inputs
 WINDOW_S = 0.1
 SMOOTHING_SAMPLES = 15  # of the parabola through recorded positions that gives speed at a start
 UNSEEN_PENALTY = 1e3  # residual in standard deviations of a sample that could not be simulated
-OUTLYING = 3.0  # windows worse than this many typical errors count less
+ACTIVE = 5.0  # noise deviations of an output that moves within a window
+OUTLYING = 3.0  # windows worse than this many typical errors count no more than one that is
 THREADS = 2
+
+
+@dataclass(frozen=True)
+class ErrorModel:
+    """Typical errors of a model: see the module's docstring.  Every field has shape (n_y, 1)."""
+
+    quiet: np.ndarray
+    share: np.ndarray
+    quiet_samples: np.ndarray
+    moving_samples: np.ndarray
+
+    def scale(self, activity: np.ndarray, noise: np.ndarray, correlated: bool = True) -> np.ndarray:
+        """What residuals are to be divided by, shape (n_y, n_windows)."""
+        size = np.sqrt(self.quiet**2 + (self.share * activity) ** 2)
+        samples = np.where(activity > ACTIVE * noise, self.moving_samples, self.quiet_samples)
+        return size * np.sqrt(samples) if correlated else size
 
 
 @dataclass(frozen=True)
@@ -54,6 +76,8 @@ class Windows:
         Standard deviation of the noise of each output, shape (n_y,).
     scale
         What residuals are divided by, shape (n_y, n_windows).
+    errors
+        The error model that gave the scales.
     start, start_deviation
         Start states guessed from the recording and their standard deviations (n_x, n_windows).
     """
@@ -65,6 +89,7 @@ class Windows:
     measured: np.ndarray
     noise: np.ndarray
     scale: np.ndarray
+    errors: ErrorModel
     start: np.ndarray
     start_deviation: np.ndarray
 
@@ -77,6 +102,11 @@ class Windows:
         return np.where(np.isnan(self.measured), 0.0, 1.0 / self.scale[:, :, None])
 
     @property
+    def floor(self) -> float:
+        """What sensor noise alone adds to the sum of squared weighted residuals."""
+        return float(np.sum((self.weight * self.noise[:, None, None]) ** 2))
+
+    @property
     def count(self) -> int:
         """Number of recorded values."""
         return int(np.count_nonzero(self.weight))
@@ -85,17 +115,38 @@ class Windows:
         """The same windows with scales from weighted residuals (n_y, n_windows, L) of a model."""
         recorded = np.maximum((self.weight > 0).sum(axis=2), 1)
         squares = (residual**2).sum(axis=2)
-        size = self.scale * np.sqrt(squares / recorded)
-        typical = np.maximum(np.median(size, axis=1), self.noise)[:, None]
-        excess = np.maximum(size / (OUTLYING * typical), 1.0)
-        correlated = np.median(residual.sum(axis=2) ** 2 / np.maximum(squares, 1e-300), axis=1)
-        samples = np.clip(correlated, 1.0, self.length)[:, None]
-        return replace(self, scale=typical * np.sqrt(excess * samples))
+        size, noise = self.scale * np.sqrt(squares / recorded), self.noise[:, None]
+        correlated = np.clip(residual.sum(axis=2) ** 2 / np.maximum(squares, 1e-300), 1, self.length)
+        moves = self.activity > ACTIVE * noise
+        quiet = np.maximum(_median_where(~moves, size), noise)
+        beyond = np.sqrt(np.maximum(size**2 - quiet**2, 0.0))
+        share = _median_where(moves, beyond / np.maximum(self.activity, noise))
+        model = ErrorModel(
+            quiet,
+            share,
+            np.maximum(_median_where(~moves, correlated), 1.0),
+            np.maximum(_median_where(moves, correlated), 1.0),
+        )
+        expected = model.scale(self.activity, noise, correlated=False)
+        excess = np.maximum(size / (OUTLYING * expected), 1.0)
+        scale = model.scale(self.activity, noise) * excess
+        return replace(self, scale=scale, errors=model)
+
+    @cached_property
+    def activity(self) -> np.ndarray:
+        """Standard deviation of each output within each window beyond noise, (n_y, n_windows)."""
+        recorded = np.isfinite(self.measured)
+        count = np.maximum(recorded.sum(axis=2), 1)
+        values = np.where(recorded, self.measured, 0.0)
+        mean = values.sum(axis=2) / count
+        spread = np.where(recorded, self.measured - mean[:, :, None], 0.0)
+        variance = (spread**2).sum(axis=2) / count
+        return np.sqrt(np.maximum(variance - self.noise[:, None] ** 2, 0.0))
 
     def scaled_like(self, other: Windows) -> Windows:
-        """The same windows with the typical scales of others: a held-out recording's yardstick."""
-        typical = other.scale.min(axis=1, keepdims=True)
-        return replace(self, scale=np.broadcast_to(typical, self.scale.shape).copy())
+        """The same windows with the error shares of others: a held-out recording's yardstick."""
+        scale = other.errors.scale(self.activity, self.noise[:, None])
+        return replace(self, scale=scale, errors=other.errors)
 
     def with_plant(self, plant: Plant) -> Windows:
         """The same windows for a plant with other effects; states it shares keep their start."""
@@ -172,7 +223,11 @@ def cut_windows(
     start, deviation = _starts(plant, recordings, firsts)
     sigma = np.array([noise[name] for name in plant.measured])
     scale = np.tile(sigma[:, None], (1, measured.shape[1]))
-    return Windows(plant, recordings, firsts, length, measured, sigma, scale, start, deviation)
+    one = np.ones((len(sigma), 1))
+    errors = ErrorModel(sigma[:, None], 0.0 * one, one, one)
+    return Windows(
+        plant, recordings, firsts, length, measured, sigma, scale, errors, start, deviation
+    )
 
 
 def window_run(plant: Plant, sample_time_s: float, length: int) -> ca.Function:
@@ -191,6 +246,12 @@ def window_run(plant: Plant, sample_time_s: float, length: int) -> ca.Function:
         x = ca.MX(0, length)
     y = model.h.map(length)(x, u, d, ca.repmat(p, 1, length))
     return ca.Function("window", [x0, u, d, p], [y])
+
+
+def _median_where(chosen: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Median of the chosen values of each row, 0 where none is, shape (n, 1)."""
+    rows = [np.median(v[c]) if c.any() else 0.0 for v, c in zip(values, chosen, strict=True)]
+    return np.array(rows)[:, None]
 
 
 def _firsts(recording: Recording, length: int) -> tuple[int, ...]:
@@ -222,7 +283,7 @@ def _cut_inputs(
         )
         for k in (0, 1)
     )
-    u, d = (rows.reshape(rows.shape[0], -1) for rows in cut)
+    u, d = (rows.reshape(rows.shape[0], rows.shape[1] * length) for rows in cut)
     return u, d
 
 

@@ -1,0 +1,166 @@
+"""What a diagnosis says: frozen values that the command line prints and the report draws."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+
+import numpy as np
+
+from workbench.effect import Kind
+from workbench.fitting.gauss_newton import Fit
+from workbench.plant import Candidate
+
+
+class Verdict(Enum):
+    """The answer in one word (interface.md section 4)."""
+
+    FOUND = "found"
+    SMALL_PROXY = "small_proxy"
+    TIE = "tie"
+    NOTHING_MISSING = "nothing_missing"
+    NOT_IN_CATALOGUE = "not_in_catalogue"
+
+
+class DecidedBy(Enum):
+    """How far a candidate was followed."""
+
+    SCAN = "scan"
+    REFIT = "refit"
+    NOT_APPLICABLE = "not applicable"
+
+
+@dataclass(frozen=True)
+class Size:
+    """A fitted strength or form in SI, with its standard deviation."""
+
+    value: float
+    deviation: float
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """One row of the ranking.
+
+    Attributes
+    ----------
+    size
+        Strength and forms by full parameter name; empty where the scan alone decided.
+    drop_train, drop_validation
+        Share of the noise-weighted squared error beyond noise that goes away; the second is NaN
+        where the candidate was not refitted.
+    tied_with
+        Public names of the candidates that cannot be told apart from it here.
+    compensable
+        Share of its effect on this recording that the fitted parameters can imitate.
+    accepted, reasons
+        Whether it passes every criterion of diagnosis.md 1.6, and why not in words.
+    """
+
+    candidate: Candidate
+    kind: Kind
+    size: Mapping[str, Size]
+    drop_train: float
+    drop_validation: float
+    tied_with: tuple[str, ...]
+    compensable: float
+    decided_by: DecidedBy
+    accepted: bool
+    reasons: tuple[str, ...]
+    fit: Fit | None = field(default=None, repr=False)
+
+
+@dataclass(frozen=True)
+class SignalError:
+    """Error of one output over windows: RMSE in SI, fit percent, noise and chi2 per sample."""
+
+    rmse: float
+    fit_percent: float
+    noise: float
+
+
+@dataclass(frozen=True)
+class Dependence:
+    """The missing term of a balance against one variable.
+
+    ``explains`` is the correlation ratio; ``bins`` holds centres, means and standard deviations,
+    shape (3, n_bins), in SI; ``term`` is named with its unit, for example ``force_n``.
+    """
+
+    variable: str
+    explains: float
+    bins: np.ndarray
+
+
+@dataclass(frozen=True)
+class Where:
+    """Where the model fails.
+
+    Attributes
+    ----------
+    by_balance
+        Log-likelihood gained by an unknown input in each balance, at prior parameters.
+    balance
+        The one that gains most.
+    term, term_unit
+        Its missing term over the training recording, shape (n,), in SI.
+    term_deviation, time_s
+        Its standard deviation and the sample times, shape (n,).
+    against
+        Its dependence on the driving variables, strongest first.
+    by_regime
+        Share of the squared error by regime, largest first.
+    """
+
+    balance: str
+    by_balance: Mapping[str, float]
+    term_name: str
+    time_s: np.ndarray
+    term: np.ndarray
+    term_deviation: np.ndarray
+    against: tuple[Dependence, ...]
+    by_regime: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Law:
+    """An empirical law for a balance that no effect of the catalogue explains.
+
+    ``terms`` are coefficients in SI by feature, for example ``{"v|v|": -240.0}``; ``ranges`` the
+    range of each driving variable it was seen in.  It is not a physical effect.
+    """
+
+    balance: str
+    terms: Mapping[str, float]
+    ranges: Mapping[str, tuple[float, float]]
+    drop_train: float
+    drop_validation: float
+    text: str
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """One round of diagnosis; see interface.md section 4 for its JSON.
+
+    ``before`` and ``after`` map ``train`` and ``validation`` to errors by public output name.
+    ``base`` is the prior fit without any addition, ``base_validation`` the same on held-out data.
+    """
+
+    rig_name: str
+    verdict: Verdict
+    sentence: str
+    ranking: tuple[Ranked, ...]
+    where: Where | None
+    before: Mapping[str, Mapping[str, SignalError]]
+    after: Mapping[str, Mapping[str, SignalError]]
+    law: Law | None
+    warnings: tuple[str, ...]
+    base: Fit = field(repr=False)
+    base_validation: Fit | None = field(repr=False)
+
+    @property
+    def best(self) -> Ranked | None:
+        """The first row of the ranking where the verdict names one."""
+        named = (Verdict.FOUND, Verdict.TIE)
+        return self.ranking[0] if self.ranking and self.verdict in named else None
