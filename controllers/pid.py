@@ -39,7 +39,7 @@ class PidSpec:
         Time constant of the filter on the velocity.
     """
 
-    sample_time_s: float = 1e-3
+    sample_time_s: float = 2e-3
     stiffening: float = 6.0
     share_of_limit: float = 0.15
     integral_time_s: float = 1.0

@@ -39,7 +39,7 @@ class ExtendedKalman:
         known = dict(zip(self.plant.measured, measurement, strict=True))
         X = np.zeros(len(found.scale))
         X[: len(self.plant.scale)] = consistent_start(self.plant, known) / self.plant.scale
-        return self._estimate(X, found.start_covariance)
+        return self.estimate(X, found.start_covariance)
 
     def update(self, last: Estimate, command: np.ndarray, measurement: np.ndarray) -> Estimate:
         found, (_, d, p) = self.filter, self.plant.nominal
@@ -47,9 +47,9 @@ class ExtendedKalman:
         received = np.isfinite(measurement)
         y = np.where(received, measurement, 0.0)
         X, P, *_ = found.correct(X, P, command, d, p, y, received)
-        return self._estimate(X.full().ravel(), P.full())
+        return self.estimate(X.full().ravel(), P.full())
 
-    def _estimate(self, X: np.ndarray, P: np.ndarray) -> Estimate:
+    def estimate(self, X: np.ndarray, P: np.ndarray) -> Estimate:
         n, scale = len(self.plant.scale), self.filter.scale
         notes = {
             f"unknown {name}": value

@@ -134,7 +134,7 @@ class PlantFilter:
         H = ca.horzcat(C, ca.MX(n_y, size - n)) * ca.repmat(received, 1, size)
         e = received * (y - expected) / r
         S = H @ P @ H.T + ca.MX.eye(n_y)
-        K = self._corrected[:, None] * ca.solve(S, H @ P).T
+        K = self.corrected[:, None] * ca.solve(S, H @ P).T
         rest = ca.MX.eye(size) - K @ H
         weighted = ca.solve(S, ca.horzcat(e, H))
         likely = -0.5 * (
@@ -175,7 +175,7 @@ class PlantFilter:
         ).reshape(len(self.plant.scale), -1)
 
     @property
-    def _corrected(self) -> np.ndarray:
+    def corrected(self) -> np.ndarray:
         """1 for what a measurement corrects, 0 for bristles, shape (n_x + n_w,)."""
         bristles = [f"{m.name}.deflection_m" for m in self.plant.members if _slides(m)]
         free = [float(name not in bristles) for name in self.plant.model.states]
