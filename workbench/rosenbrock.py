@@ -32,8 +32,8 @@ import numpy as np
 
 GAMMA = 0.5
 COARSEST_STEP_S = 1e-3
-FINER = 4
-LEVELS = 4  # steps of 1, 1/4, 1/16 and 1/64 of the coarse one
+FINER = 3
+LEVELS = 5  # steps of 1, 1/3, 1/9, 1/27 and 1/81 of the coarse one
 
 
 def controlled_step(
