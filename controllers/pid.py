@@ -40,8 +40,8 @@ class PidSpec:
     """
 
     sample_time_s: float = 2e-3
-    stiffening: float = 6.0
-    share_of_limit: float = 0.15
+    stiffening: float = 16.0
+    share_of_limit: float = 0.4
     integral_time_s: float = 1.0
     filter_s: float = 2e-3
     positioning: PositioningSpec = field(default_factory=lambda: CALM)

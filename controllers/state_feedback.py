@@ -23,8 +23,8 @@ class LqSpec:
     """
 
     sample_time_s: float = 2e-3
-    position_m: float = 2e-3
-    velocity_m_s: float = 0.15
+    position_m: float = 1.5e-3
+    velocity_m_s: float = 0.12
     pressure_pa: float = 1e6
     opening_v: float = 0.3
     integral_time_s: float = 0.1

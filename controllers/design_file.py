@@ -1,0 +1,147 @@
+"""DESIGN.toml: what a controller was designed on and with, so that it can be built again.
+
+The file holds the plant's name, the values it had and the effects it lacked, the numbers of the
+specification, and, for people, the gains of each mode.  Modes and gains follow from the rest, so
+reading designs anew: a file cannot say one thing and do another.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from controllers import CONTROLLERS
+from linearize.standard import standard_modes
+from workbench.contracts import Controller
+from workbench.plant import Plant, require
+from workbench.plants import PLANTS
+
+
+@dataclass(frozen=True)
+class Design:
+    """A controller with all that made it.
+
+    method       key of :data:`controllers.CONTROLLERS`
+    plant        the plant its modes were taken from
+    spec         the specification, a dataclass of numbers
+    """
+
+    method: str
+    plant: Plant
+    spec: Any
+    controller: Controller
+
+
+def design(method: str, plant: Plant, numbers: Mapping[str, Any] | None = None) -> Design:
+    """A design by the method's name; ``numbers`` replace those of its specification.
+
+    Raises
+    ------
+    KeyError
+        If there is no such method, or the specification has no such number.
+    """
+    if method not in CONTROLLERS:
+        raise KeyError(f"no controller {method}; there is {', '.join(CONTROLLERS)}")
+    found = CONTROLLERS[method]
+    spec = changed(found.spec(), numbers or {}, method)
+    return Design(method, plant, spec, found.design(standard_modes(plant), spec))
+
+
+def changed(spec: Any, numbers: Mapping[str, Any], where: str) -> Any:
+    """The specification with some numbers replaced, tables inside it likewise."""
+    require(numbers, [f.name for f in fields(spec)], where)
+    values = {f.name: getattr(spec, f.name) for f in fields(spec)}
+    for key, value in numbers.items():
+        old = values[key]
+        inside = f"{where}.{key}"
+        if is_dataclass(old):
+            values[key] = changed(old, value, inside)
+        elif isinstance(value, bool) or not isinstance(value, int | float):
+            raise ValueError(f"{inside} is {value!r}, expected a number")
+        else:
+            values[key] = type(old)(value)
+    return type(spec)(**values)
+
+
+def write_design(found: Design, path: Path) -> None:
+    """Write a design, by way of a temporary name, so that no half-written file is left."""
+    part = path.with_name(path.name + ".part")
+    part.write_text("\n".join(_lines(found)) + "\n", encoding="utf-8")
+    part.replace(path)
+
+
+def read_design(path: Path) -> Design:
+    """The design of a file, built anew.
+
+    Raises
+    ------
+    ValueError
+        If it is no TOML, or a table or a key is missing.
+    KeyError
+        If it names something that does not exist.
+    """
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        method, place = content["controller"], content["plant"]
+        require([place["name"]], PLANTS, "the list of plants")
+        plant = PLANTS[place["name"]]().without(*place["removed"]).with_values(place["values"])
+        return design(method, plant, content["spec"])
+    except tomllib.TOMLDecodeError as error:
+        raise ValueError(f"{path.name}: {error}") from error
+    except KeyError as error:
+        if error.args[0] in ("controller", "plant", "name", "removed", "values", "spec"):
+            raise ValueError(f"{path.name} has no {error.args[0]}") from error
+        raise
+
+
+def _lines(found: Design) -> Iterator[str]:
+    plant = found.plant
+    original = PLANTS[plant.name]()
+    had, has = ({e.name for e in p.effects} for p in (original, plant))
+    extra = sorted(has - had)
+    if extra:
+        raise ValueError(f"{plant.name} has effects of its own: {', '.join(extra)}")
+    before = original.values
+    yield f'controller = "{found.method}"'
+    yield "\n[plant]"
+    yield f'name = "{plant.name}"'
+    yield f"removed = [{', '.join(repr(name) for name in sorted(had - has))}]"
+    yield "\n[plant.values]"
+    for name, value in plant.values.items():
+        if value != before[name]:
+            yield f'"{name}" = {float(value)!r}'
+    yield from _table("spec", found.spec)
+    yield "\n# gains by mode, for reading only"
+    for name, gain in gains(found.controller):
+        yield f"# {name}: {gain}"
+
+
+def _table(name: str, spec: Any) -> Iterator[str]:
+    """A specification as a table, its own specifications as tables below it."""
+    yield f"\n[{name}]"
+    inside = []
+    for f in fields(spec):
+        value = getattr(spec, f.name)
+        if is_dataclass(value):
+            inside.append((f"{name}.{f.name}", value))
+        else:
+            yield f"{f.name} = {value!r}"
+    for key, value in inside:
+        yield from _table(key, value)
+
+
+def gains(controller: Controller) -> Iterator[tuple[str, str]]:
+    """The numbers of each mode's design as text, forward then backward, where it has gains."""
+    schedule = getattr(controller, "gains", None)
+    if schedule is None:
+        return
+    for way in ("forward", "backward"):
+        for place, gain in zip(schedule.positions_m, getattr(schedule, way), strict=True):
+            values = (np.round(getattr(gain, f.name), 8) for f in fields(gain))
+            words = (f"{f.name} {v}" for f, v in zip(fields(gain), values, strict=True))
+            yield f"{way} at {place:.4g} m", "; ".join(" ".join(word.split()) for word in words)

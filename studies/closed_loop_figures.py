@@ -1,0 +1,82 @@
+"""Figures of a closed-loop check: small functions that draw on axes they are given."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from linearize.standard import POSITION, PRESSURES
+from studies.closed_loop_check import Check
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from workbench.closed_loop import LoopRecord
+
+LINES = ("-", "--", "-.", ":")
+
+
+def draw_position(axes: Axes, records: dict[str, LoopRecord]) -> None:
+    """The reference and each run's position."""
+    first = next(iter(records.values())).recording
+    axes.plot(first.time_s, 1e3 * first[f"reference.{POSITION}"], color="0.6", label="reference")
+    for style, (name, record) in zip(_styles(records), records.items(), strict=True):
+        recording = record.recording
+        axes.plot(recording.time_s, 1e3 * recording[POSITION], style, label=name)
+    axes.set_ylabel("position (mm)")
+    axes.legend()
+
+
+def draw_error(axes: Axes, records: dict[str, LoopRecord], largest_m: float = 1e-3) -> None:
+    """Each run's error, near zero."""
+    for style, (name, record) in zip(_styles(records), records.items(), strict=True):
+        recording = record.recording
+        error = recording[POSITION] - recording[f"reference.{POSITION}"]
+        axes.plot(recording.time_s, 1e3 * error, style, label=name)
+    axes.set_ylim(-1e3 * largest_m, 1e3 * largest_m)
+    axes.set_ylabel("error (mm)")
+
+
+def draw_command(axes: Axes, records: dict[str, LoopRecord]) -> None:
+    """Each run's command."""
+    for style, (name, record) in zip(_styles(records), records.items(), strict=True):
+        recording = record.recording
+        command = next(key for key in recording.channels if key.endswith("command_v"))
+        axes.step(recording.time_s, recording[command], style, where="post", label=name)
+    axes.set_ylabel("command (V)")
+    axes.set_xlabel("time (s)")
+
+
+def draw_pressures(axes: Axes, record: LoopRecord) -> None:
+    """Both pressures of one run with their estimates."""
+    recording = record.recording
+    for style, name in zip(LINES, PRESSURES, strict=False):
+        axes.plot(recording.time_s, 1e-5 * recording[name], style, label=name.split(".")[0])
+        axes.plot(recording.time_s, 1e-5 * record.estimates[name], color="0.6", linewidth=0.5)
+    axes.set_ylabel("pressure (bar)")
+    axes.set_xlabel("time (s)")
+    axes.legend()
+
+
+def check_figures(check: Check) -> dict[str, Figure]:
+    """One figure per scenario, by file name without ending: position, error and command."""
+    from matplotlib.figure import Figure
+
+    figures = {}
+    for scenario in dict.fromkeys(row.scenario for row in check.rows):
+        records = {
+            f"{row.design}, {row.estimator}": record
+            for row, record in zip(check.rows, check.records, strict=True)
+            if row.scenario == scenario
+        }
+        figure = Figure(figsize=(7.16, 5.5), layout="constrained")
+        position, error, command = figure.subplots(3, sharex=True)
+        draw_position(position, records)
+        draw_error(error, records)
+        draw_command(command, records)
+        figures[f"closed_loop_{scenario}"] = figure
+    return figures
+
+
+def _styles(records: dict[str, LoopRecord]) -> list[str]:
+    return [LINES[i % len(LINES)] for i in range(len(records))]
