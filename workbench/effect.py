@@ -164,6 +164,8 @@ class Cause:
     kind, held  a shift of the fitted field ``held`` is scored with that field at its prior
     sizes       shares of the typical strength that the scan tries (both signs where signed)
     shapes      values of form fields to scan, by field
+    tolerated   (standard deviation, largest size) of what is always there and never worth a name:
+                a fit may use that much of the strength as a nuisance
     shown_by    the recording that shows it
     source      paper and equation, or book
     """
@@ -180,6 +182,7 @@ class Cause:
     held: str | None = None
     sizes: tuple[float, ...] = ONE_SIDED
     shapes: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    tolerated: tuple[float, float] | None = None
 
 
 def strength(

@@ -26,7 +26,13 @@ from itertools import product
 
 import numpy as np
 
-from workbench.fitting.gauss_newton import Linearised, Point, linearise, normal_equations
+from workbench.fitting.gauss_newton import (
+    Linearised,
+    Normal,
+    Point,
+    linearise,
+    normal_equations,
+)
 from workbench.fitting.unknowns import Unknowns
 from workbench.fitting.windows import Windows
 from workbench.plant import Candidate, Plant
@@ -73,16 +79,12 @@ class Metric:
     """The nuisance-free metric M at a fitted point; see the module's docstring."""
 
     at: Linearised
-    unknowns: Unknowns
-    hessian: np.ndarray
-    gradient: np.ndarray
-    residual: np.ndarray
-    derivatives: np.ndarray
+    normal: Normal
 
     @property
     def cost(self) -> float:
         """c(0): the projected cost of the model as it is."""
-        return self._value(self.residual, self.gradient)
+        return self._value(self.normal.residual, self.normal.gradient)
 
     def rows(self, residuals: np.ndarray) -> np.ndarray:
         """Residuals (n, n_y, n_windows, L) as projected rows, shape (n, n_windows, rows)."""
@@ -94,33 +96,37 @@ class Metric:
 
     def explained(self, row: np.ndarray) -> tuple[float, np.ndarray]:
         """(cost, linear step of the scaled unknowns) for projected rows (n_windows, rows)."""
-        flat = self.derivatives.reshape(-1, self.derivatives.shape[2])
-        gradient = flat.T @ row.ravel() + self.unknowns.precision * self.at.point.t
-        step = -np.linalg.solve(self.hessian, gradient) if len(gradient) else gradient
+        flat = self._columns
+        gradient = flat.T @ row.ravel() + self.normal.precision * self.at.point.t
+        step = -np.linalg.solve(self.normal.hessian, gradient) if len(gradient) else gradient
         return self._value(row, gradient), np.clip(step, -LARGEST_STEP, LARGEST_STEP)
 
     def signature(self, row: np.ndarray) -> tuple[np.ndarray, float]:
         """(what the nuisances cannot imitate of a change, share of it that they can)."""
-        flat = self.derivatives.reshape(-1, self.derivatives.shape[2])
+        flat = self._columns
         change = row.ravel()
         if not flat.shape[1]:
             return change, 0.0
-        left = change - flat @ np.linalg.solve(self.hessian, flat.T @ change)
+        left = change - flat @ np.linalg.solve(self.normal.hessian, flat.T @ change)
         whole = float(change @ change)
         share = 1.0 - float(change @ left) / whole if whole > 0 else 1.0
         return left, float(np.clip(share, 0.0, 1.0))
 
+    @property
+    def _columns(self) -> np.ndarray:
+        J = self.normal.derivatives
+        return J.reshape(-1, J.shape[2])
+
     def _value(self, row: np.ndarray, gradient: np.ndarray) -> float:
-        prior = float(np.sum(self.unknowns.precision * self.at.point.t**2))
-        gained = float(gradient @ np.linalg.solve(self.hessian, gradient)) if len(gradient) else 0.0
+        prior = float(np.sum(self.normal.precision * self.at.point.t**2))
+        gained = float(gradient @ np.linalg.solve(self.normal.hessian, gradient)) if len(gradient) else 0.0
         return float(row.ravel() @ row.ravel()) + prior - gained
 
 
 def metric_at(windows: Windows, unknowns: Unknowns, point: Point) -> Metric:
     """The metric M at a point, from one batch of simulations."""
     at = linearise(windows, unknowns, point)
-    H, g, r, J = normal_equations(at, unknowns)
-    return Metric(at, unknowns, H, g, r, J)
+    return Metric(at, normal_equations(at, unknowns))
 
 
 def staged(whole: Plant, *members: str) -> Plant:
@@ -195,7 +201,7 @@ def _profiles(
     for pairs in found.values():
         pairs.sort(key=lambda pair: -pair[0].drop)
         best, row = pairs[0]
-        signature, share = metric.signature(metric.residual - row)
+        signature, share = metric.signature(metric.normal.residual - row)
         profiles.append(Profile(best.candidate, tuple(t for t, _ in pairs), signature, share))
     return profiles
 

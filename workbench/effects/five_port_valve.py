@@ -78,7 +78,7 @@ class FivePortValve(Effect):
     discharge_coefficient: Expression = form(0.5513, lower=0.1, upper=1.0)
     supply_fraction: Expression = form(0.80, lower=0.05, upper=1.5)
     exhaust_fraction: Expression = form(0.65, lower=0.05, upper=1.5)
-    area_exponent: Expression = form(1.6, lower=1.0, upper=3.0)
+    area_exponent: Expression = form(1.6, lower=1.0, upper=3.0, deviation=0.1)  # chosen
     centre_v: Expression = form(5.0, lower=0.1, upper=9.9)
     full_v: Expression = form(10.0, lower=1.0, upper=24.0)
     supply_critical_ratio: Expression = form(0.35, lower=0.05, upper=0.6)

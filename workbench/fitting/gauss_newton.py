@@ -172,24 +172,47 @@ def unit(n: int, k: int) -> np.ndarray:
     return np.eye(n)[k]
 
 
-def normal_equations(
-    at: Linearised, unknowns: Unknowns
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """(H, g, projected residual, projected derivatives) of the cost in the scaled unknowns.
+@dataclass(frozen=True)
+class Normal:
+    """The quadratic model of the cost with the start states projected out.
 
-    H = J'J + Lambda and g = J'r + Lambda t with the start states projected out.
+    H = J'J + Lambda and g = J'r + Lambda t in the scaled unknowns.  An unknown that sits at a
+    bound and would go beyond it takes no part: its column is zero.
+
+    Attributes
+    ----------
+    hessian, gradient
+        H (n_p, n_p) and g (n_p,).
+    residual, derivatives
+        r (n_windows, rows) and J (n_windows, rows, n_p), projected.
+    precision
+        Prior weights, zero for the unknowns that take no part, (n_p,).
     """
+
+    hessian: np.ndarray
+    gradient: np.ndarray
+    residual: np.ndarray
+    derivatives: np.ndarray
+    precision: np.ndarray
+
+
+def normal_equations(at: Linearised, unknowns: Unknowns) -> Normal:
+    """The quadratic model at a point; see :class:`Normal`."""
     r, J = at.projected(at.residual[:, :, None])[:, :, 0], at.projected(at.parameters)
     flat = J.reshape(-1, J.shape[2])
-    prior = np.diag(unknowns.precision)
-    return flat.T @ flat + prior, flat.T @ r.ravel() + prior @ at.point.t, r, J
+    gradient = flat.T @ r.ravel() + unknowns.precision * at.point.t
+    free = ~unknowns.pinned(at.point.t, gradient)
+    flat = flat * free
+    hessian = flat.T @ flat + np.diag(np.where(free, unknowns.precision, 1.0))
+    return Normal(hessian, gradient * free, r, flat.reshape(J.shape), unknowns.precision * free)
 
 
 def _damped_steps(
     at: Linearised, unknowns: Unknowns
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Gauss-Newton steps of unknowns and start states, one per damping."""
-    H, g, _, _ = normal_equations(at, unknowns)
+    normal = normal_equations(at, unknowns)
+    H, g = normal.hessian, normal.gradient
     steps = []
     for damping in DAMPINGS:
         dt = -np.linalg.solve(H + damping * np.diag(np.diag(H)), g) if len(g) else np.zeros(0)

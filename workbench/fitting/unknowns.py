@@ -41,6 +41,12 @@ class Unknowns:
             self.prior / self.scale
         )
 
+    def pinned(self, t: np.ndarray, gradient: np.ndarray) -> np.ndarray:
+        """True where an unknown sits at a bound and the cost falls beyond it, shape (n_p,)."""
+        low = t <= (self.lower - self.prior) / self.scale + 1e-9
+        high = t >= (self.upper - self.prior) / self.scale - 1e-9
+        return (low & (gradient > 0)) | (high & (gradient < 0))
+
     def clipped(self, t: np.ndarray) -> np.ndarray:
         """Scaled unknowns within their bounds."""
         return np.clip(
@@ -57,7 +63,8 @@ def nominal_unknowns(
     """Every uncertain parameter of what is present, and the strengths and forms of what is added.
 
     ``deviations`` are standard deviations that override the catalogue's; ``fixed`` are never
-    moved.  A strength at its null is absent, and is not moved unless its cause is in ``added``.
+    moved.  A strength at its null is absent, and is not moved unless its cause is in ``added`` or
+    a little of it is tolerated (``Cause.tolerated``).
     """
     values, known = plant.values, plant.parameters
     deviations, fixed = dict(deviations or {}), set(fixed)
@@ -71,9 +78,15 @@ def nominal_unknowns(
             continue
         rows.append((name, value, deviation, 1.0))
     rows += [(name, values[name], _size(plant, name), WIDE**-2) for name in free]
+    bounds = {name: (known[name].lower, known[name].upper) for name, *_ in rows}
+    for candidate in plant.candidates.values():
+        name, tolerated = candidate.strength, candidate.cause.tolerated
+        if tolerated and name not in bounds and name not in fixed:
+            rows.append((name, values[name], tolerated[0], 1.0))
+            bounds[name] = (known[name].lower, tolerated[1])
     names = tuple(row[0] for row in rows)
     prior, scale, precision = (np.array([row[k] for row in rows]) for k in (1, 2, 3))
-    lower, upper = (np.array([getattr(known[n], k) for n in names]) for k in ("lower", "upper"))
+    lower, upper = (np.array([bounds[n][k] for n in names]) for k in (0, 1))
     return Unknowns(names, prior, scale, lower, upper, precision)
 
 

@@ -28,12 +28,12 @@ import casadi as ca
 import numpy as np
 
 from workbench.effect import Effect
+from workbench.fitting.starts import guessed_states
 from workbench.plant import Plant
 from workbench.recording import Recording
 from workbench.simulation import inputs
 
 WINDOW_S = 0.1
-SMOOTHING_SAMPLES = 15  # of the parabola through recorded positions that gives speed at a start
 UNSEEN_PENALTY = 1e3  # residual in standard deviations of a sample that could not be simulated
 ACTIVE = 5.0  # noise deviations of an output that moves within a window
 OUTLYING = 3.0  # windows worse than this many typical errors count no more than one that is
@@ -297,35 +297,3 @@ def _starts(
     ]
     both = np.concatenate(columns, axis=2)
     return both[0], both[1]
-
-
-def guessed_states(plant: Plant, recording: Recording) -> np.ndarray:
-    """States at every sample and their standard deviations from the recording, (2, n_x, n)."""
-    n = len(recording)
-    seen = dict(recording.channels)
-    for name in list(seen):
-        if name.endswith(".position_m") and name.replace("position_m", "velocity_m_s") not in seen:
-            speed = slope(seen[name], recording.sample_time_s, recording.starts)
-            seen[name.replace("position_m", "velocity_m_s")] = speed
-    rows = []
-    for member in plant.members:
-        guesses = member.guess(seen)
-        for state in member.states():
-            value, deviation = guesses.get(state.quantity, (float(state.initial), state.scale))
-            values = np.broadcast_to(np.asarray(value, dtype=float), (n,))
-            values = np.where(np.isfinite(values), values, float(state.initial))
-            rows.append(np.stack([values, np.full(n, deviation)]))
-    return np.stack(rows, axis=1) if rows else np.zeros((2, 0, n))
-
-
-def slope(values: np.ndarray, sample_time_s: float, starts: tuple[int, ...]) -> np.ndarray:
-    """Rate of a recorded channel by a moving parabola inside each piece, shape (n,)."""
-    from scipy.signal import savgol_filter
-
-    rate = np.zeros(len(values))
-    for first, last in zip(starts, (*starts[1:], len(values)), strict=True):
-        width = min(SMOOTHING_SAMPLES, (last - first - 1) // 2 * 2 + 1)
-        if width >= 3:
-            piece = np.nan_to_num(values[first:last])
-            rate[first:last] = savgol_filter(piece, width, 2, deriv=1, delta=sample_time_s)
-    return rate
