@@ -124,21 +124,13 @@ class Program:
         """Inverse of H, for the optimum without limits."""
         return np.linalg.inv(self.H)
 
-    @cached_property
-    def solver(self) -> osqp.OSQP:
-        """OSQP, set up once; gradient and bounds are updated, and every solve is started by us."""
+    def solver(self, g: np.ndarray, low: np.ndarray, high: np.ndarray) -> osqp.OSQP:
+        """A fresh OSQP: one that is kept adapts its step length, and would answer by its past."""
         import osqp
 
         solver = osqp.OSQP()
-        size, rows = len(self.H), len(self.rows)
-        solver.setup(
-            sp.csc_matrix(np.triu(self.H)),
-            np.zeros(size),
-            sp.csc_matrix(self.rows),
-            np.full(rows, -1.0),
-            np.full(rows, 1.0),
-            **SETTINGS,
-        )
+        H, rows = sp.csc_matrix(np.triu(self.H)), sp.csc_matrix(self.rows)
+        solver.setup(H, g, rows, low, high, **SETTINGS)
         return solver
 
 

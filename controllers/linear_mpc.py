@@ -109,8 +109,7 @@ def limited_plan(
     steady_v: float,
 ) -> tuple[Plan, dict[str, float]]:
     """OSQP's plan, started from the last one; without an answer the last one, shifted."""
-    n, solver = program.horizon, program.solver
-    solver.update(q=g, l=low, u=high)
+    n, solver = program.horizon, program.solver(g, low, high)
     cold = np.zeros(len(g)), np.zeros(len(low))
     solver.warm_start(*((before.primal, before.dual) if before else cold))
     result = solver.solve(raise_error=False)

@@ -24,7 +24,7 @@ def draw_position(axes: Axes, records: dict[str, LoopRecord]) -> None:
         recording = record.recording
         axes.plot(recording.time_s, 1e3 * recording[POSITION], style, label=name)
     axes.set_ylabel("position (mm)")
-    axes.legend()
+    axes.legend(loc="lower right")
 
 
 def draw_error(axes: Axes, records: dict[str, LoopRecord], largest_m: float = 1e-3) -> None:
@@ -55,7 +55,7 @@ def draw_pressures(axes: Axes, record: LoopRecord) -> None:
         axes.plot(recording.time_s, 1e-5 * record.estimates[name], color="0.6", linewidth=0.5)
     axes.set_ylabel("pressure (bar)")
     axes.set_xlabel("time (s)")
-    axes.legend()
+    axes.legend(loc="lower right")
 
 
 def check_figures(check: Check) -> dict[str, Figure]:

@@ -196,6 +196,16 @@ def test_mpc_without_limits_and_move_cost_is_the_regulator(hybrid):
         assert first_move(REST + away) - first_move(REST) == pytest.approx(-(K @ away)[0], rel=1e-3)
 
 
+def test_mpc_at_its_limits_gives_the_same_answer_whatever_it_solved_before(controllers):
+    controller, far = controllers["mpc"], seen([0.145, -1.5, 1.1e5, 6.95e5])
+    first = controller.step(controller.start(), held(controller, 0.28), far)
+    controller.step(first, held(controller, 0.01), seen([0.01, 1.0, 6.9e5, 1.0e5]))
+    again = controller.step(controller.start(), held(controller, 0.28), far)
+
+    assert first.notes["iterations"] > 0
+    assert np.array_equal(first.value, again.value)
+
+
 def test_mpc_falls_back_on_its_last_plan(controllers):
     controller = controllers["mpc"]
     program = controller.programs.forward[1]

@@ -1,11 +1,14 @@
 """Modes stand for the plant near their point, cover its range, and leave out what they say."""
 
+import json
+
 import numpy as np
 import pytest
 
 from linearize.analysis import analyse, analyse_all, prediction_error
 from linearize.discrete import sampled
 from linearize.equilibrium import operating_point
+from linearize.listing import document, left_out, table
 from linearize.modes import Interval, Mode
 from linearize.reduction import design_model
 from linearize.standard import COMMAND, POSITION, PRESSURES, VELOCITY, standard_modes
@@ -173,3 +176,12 @@ def test_python_control_gets_named_signals(hybrid):
 
     assert system.state_labels[0] == "slide:position_m"
     assert pytest.approx(hybrid["charge a slide + middle"].A) == system.A
+
+
+def test_the_table_has_one_line_per_mode_and_the_document_is_plain_numbers(hybrid):
+    lines = table(hybrid).splitlines()
+    entries = json.loads(json.dumps(document(hybrid)))
+
+    assert len(lines) == 28
+    assert entries[0]["A"] == hybrid.modes[0].A.tolist()
+    assert "undone in the command" in left_out(hybrid)
