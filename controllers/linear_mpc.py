@@ -56,7 +56,8 @@ class LinearMpc:
         memory, valve = last.memory, self.task.valve
         now = self.task.task(memory, reference, estimate.pick(STATES), self.sample_time_s)
         if now.rests:
-            return Command(valve.shut, Memory(memory.integral_m_s, True), {"resting": 1.0})
+            shut = valve.sent(0.0, estimate)
+            return Command(shut, Memory(memory.integral_m_s, True), {"resting": 1.0})
         program = self.programs.heaviest(now.x[0], now.ahead)
         integral = memory.integral_m_s + self.sample_time_s * now.rate_m
         plan, notes = self._solved(program, now, reference, memory, integral)
@@ -64,7 +65,7 @@ class LinearMpc:
         if opening in valve.openings_v:
             integral = memory.integral_m_s
         notes = {"resting": 0.0, "opening_v": opening, "integral_m_s": integral, **notes}
-        return Command(valve.command(opening), Memory(integral, False, plan), notes)
+        return Command(valve.sent(opening, estimate), Memory(integral, False, plan), notes)
 
     def _solved(
         self,

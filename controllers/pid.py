@@ -79,7 +79,8 @@ class Pid:
         now = self.task.task(memory, reference, estimate.pick(STATES), dt)
         slow = memory.plan + dt / (dt + self.filter_s) * (now.x[1] - memory.plan)
         if now.rests:
-            return Command(valve.shut, Memory(memory.integral_m_s, True, slow), {"resting": 1.0})
+            shut = valve.sent(0.0, estimate)
+            return Command(shut, Memory(memory.integral_m_s, True, slow), {"resting": 1.0})
         here = [*self.gains.weighted(now.x[0], now.ahead)]
         kp, ki, kd = (
             sum(w * getattr(gain, key) for w, gain in here)
@@ -92,7 +93,7 @@ class Pid:
         if opening != wanted:
             integral = memory.integral_m_s
         notes = {"resting": 0.0, "opening_v": opening, "integral_m_s": integral}
-        return Command(valve.command(opening), Memory(integral, False, slow), notes)
+        return Command(valve.sent(opening, estimate), Memory(integral, False, slow), notes)
 
 
 def pid(hybrid: HybridModel, spec: PidSpec | None = None) -> Pid:

@@ -66,7 +66,8 @@ class StateFeedback:
         memory, valve = last.memory, self.task.valve
         now = self.task.task(memory, reference, estimate.pick(STATES), self.sample_time_s)
         if now.rests:
-            return Command(valve.shut, Memory(memory.integral_m_s, True), {"resting": 1.0})
+            shut = valve.sent(0.0, estimate)
+            return Command(shut, Memory(memory.integral_m_s, True), {"resting": 1.0})
         here = [*self.gains.weighted(now.x[0], now.ahead)]
         feedback = sum(w * gain.feedback for w, gain in here)
         integral_gain = sum(w * gain.integral for w, gain in here)
@@ -76,7 +77,7 @@ class StateFeedback:
         if opening != wanted:
             integral = memory.integral_m_s
         notes = {"resting": 0.0, "opening_v": opening, "integral_m_s": integral}
-        return Command(valve.command(opening), Memory(integral), notes)
+        return Command(valve.sent(opening, estimate), Memory(integral), notes)
 
 
 def lq_state_feedback(hybrid: HybridModel, spec: LqSpec | None = None) -> StateFeedback:

@@ -7,8 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from linearize.reduction import closed_command
-from workbench.effects.valve_command import DeadZone
+from workbench.contracts import Estimate
+from workbench.effects.valve_command import DeadZone, ValveLag
 from workbench.plant import Plant
+
+LED_S = 4e-3  # time constant of a spool under the lead: faster asks for more than the noise allows
 
 
 @dataclass(frozen=True)
@@ -28,6 +31,8 @@ class ThroughValve:
         Part of the centre that the valve takes off before its dead zone.
     dead_zone
         What is undone; None where the plant has none.
+    lag
+        First-order lag of the spool; None where it has none.
     smooth_v
         o_s, the opening over which the jump builds up.
     """
@@ -38,6 +43,20 @@ class ThroughValve:
     offset_v: float
     dead_zone: DeadZone | None
     smooth_v: float
+    lag: ValveLag | None = None
+
+    def sent(self, opening_v: float, estimate: Estimate) -> np.ndarray:
+        """The command for an opening, led where the spool lags, shape (1,).
+
+        u = z + (u_wanted - z) T / T_led, so that the spool z, as estimated, moves with the time
+        constant T_led instead of T.
+        """
+        wanted = self.shut if opening_v == 0.0 else self.command(opening_v)
+        if self.lag is None:
+            return wanted
+        spool = estimate.pick([f"{self.lag.name}.lagged_v"])
+        led = spool + (wanted - spool) * max(float(self.lag.time_constant_s) / LED_S, 1.0)
+        return np.clip(led, self.lower_v, self.upper_v)
 
     def command(self, opening_v: float) -> np.ndarray:
         """The command for an opening, shape (1,), within its range."""
@@ -63,6 +82,7 @@ def through_valve(plant: Plant, smooth_v: float) -> ThroughValve:
     """The valve of a plant with one command."""
     signal = plant.commands[0]
     found = [e for e in plant.effects if isinstance(e, DeadZone) and e.signal == signal.name]
+    lags = [e for e in plant.effects if isinstance(e, ValveLag) and not e.absent]
     return ThroughValve(
         centre_v=closed_command(plant),
         lower_v=signal.lower,
@@ -70,4 +90,5 @@ def through_valve(plant: Plant, smooth_v: float) -> ThroughValve:
         offset_v=closed_command(plant) - signal.nominal,
         dead_zone=found[0] if found else None,
         smooth_v=smooth_v,
+        lag=lags[0] if lags else None,
     )

@@ -17,8 +17,10 @@ import numpy as np
 
 from workbench.effects.bristle_friction import BristleFriction
 from workbench.effects.supply_droop import SupplyDroop
-from workbench.effects.valve_command import CommandDelay, DeadZone, ValveOffset
+from workbench.effects.valve_command import CommandDelay, DeadZone, ValveLag, ValveOffset
 from workbench.plant import Plant
+
+INSIDE = (BristleFriction, SupplyDroop, ValveLag)  # effects whose states a design does without
 
 
 @dataclass(frozen=True)
@@ -131,12 +133,14 @@ def closed_command(plant: Plant) -> float:
 def _passed_over(plant: Plant, state: str) -> bool:
     member, _, quantity = state.rpartition(".")
     owner = next(m for m in plant.members if m.name == member)
-    return quantity == "mass_kg" or isinstance(owner, BristleFriction | SupplyDroop)
+    return quantity == "mass_kg" or isinstance(owner, INSIDE)
 
 
 def _stand_in(plant: Plant, state: str) -> ca.SX:
-    """What takes the place of a state: gas at supply temperature, a bristle and a droop of zero."""
+    """What takes the place of a state: gas at supply temperature, no lag, no bristle, no droop."""
     member, _, quantity = state.rpartition(".")
+    if quantity == "lagged_v":
+        return plant.model.conditions[member].entering_v
     if quantity != "mass_kg":
         return ca.SX(0.0)
     gas = plant.model.conditions[member]
@@ -159,6 +163,10 @@ def _left_out(plant: Plant) -> Iterator[LeftOut]:
         elif isinstance(member, SupplyDroop):
             yield LeftOut(
                 member.name, "supply at its nominal pressure", "slow and outside the loop"
+            )
+        elif isinstance(member, ValveLag):
+            yield LeftOut(
+                member.name, "no lag", "inside the dead zone's undoing; margins must hold it"
             )
         elif isinstance(member, CommandDelay):
             yield LeftOut(member.name, "no delay", "acts on samples; the margins must hold it")
