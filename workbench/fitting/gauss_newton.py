@@ -64,7 +64,7 @@ class Linearised:
 
     def projected(self, rows: np.ndarray) -> np.ndarray:
         """What the start states cannot explain of columns (n_windows, rows, ...)."""
-        flat = rows.reshape(*rows.shape[:2], -1)
+        flat = rows.reshape(*rows.shape[:2], int(np.prod(rows.shape[2:])))
         left = flat - self.basis @ (self.basis.transpose(0, 2, 1) @ flat)
         return left.reshape(rows.shape)
 
@@ -199,7 +199,7 @@ class Normal:
 def normal_equations(at: Linearised, unknowns: Unknowns) -> Normal:
     """The quadratic model at a point; see :class:`Normal`."""
     r, J = at.projected(at.residual[:, :, None])[:, :, 0], at.projected(at.parameters)
-    flat = J.reshape(-1, J.shape[2])
+    flat = J.reshape(J.shape[0] * J.shape[1], J.shape[2])
     gradient = flat.T @ r.ravel() + unknowns.precision * at.point.t
     free = ~unknowns.pinned(at.point.t, gradient)
     flat = flat * free
