@@ -9,6 +9,7 @@ from math import inf
 import numpy as np
 
 from estimators import ESTIMATORS
+from estimators.ahead import in_time
 from linearize.standard import POSITION, PRESSURES, VELOCITY
 from workbench.closed_loop import Hardware, LoopRecord, close_loop
 from workbench.contracts import Controller, Estimator
@@ -137,9 +138,10 @@ def standard_estimator(name: str, plant: Plant, sample_time_s: float) -> Estimat
     coarse = {key: grid / 12**0.5 for key, grid in hardware.resolution.items()}
     noise = {key: float(np.hypot(s, coarse.get(key, 0.0))) for key, s in hardware.noise.items()}
     process = {key: size for key, size in PROCESS_NOISE.items() if key in lean.model.states}
-    return ESTIMATORS[name](
+    found = ESTIMATORS[name](
         plant=lean, sample_time_s=sample_time_s, measurement_noise=noise, process_noise=process
     )
+    return in_time(found, lean)
 
 
 def check(

@@ -183,8 +183,11 @@ def test_a_lost_measurement_is_survived(plant, designs):
     assert abs(record.recording[POSITION][-1] - scenario.reference_m[-1]) < 1e-3
 
 
-def test_a_slow_spool_is_led_so_that_the_goal_is_kept(plant):
-    slow = servo_drive().with_values({"valve_lag.time_constant_s": 15e-3})
+@pytest.mark.parametrize(
+    "late", [{"valve_lag.time_constant_s": 15e-3}, {"command_delay.delay_s": 15e-3}]
+)
+def test_a_slow_spool_is_led_and_a_late_command_foreseen_so_that_the_goal_is_kept(late):
+    slow = servo_drive().with_values(late)
     method = CONTROLLERS["mpc"]
     controller = method.design(standard_modes(slow), method.spec())
 
