@@ -10,6 +10,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from workbench.effects.forces import EndStops
+from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.starts import guessed_states, slope
 from workbench.plant import Plant
 from workbench.recording import Recording
@@ -50,6 +51,24 @@ def shares(chosen: Mapping[str, np.ndarray], squared: np.ndarray) -> dict[str, f
         name: float(np.nansum(squared[samples])) / total if total > 0 else 0.0
         for name, samples in chosen.items()
     }
+    return dict(sorted(found.items(), key=lambda item: -item[1]))
+
+
+def regime_shares(fit: Fit) -> dict[str, float]:
+    """Share of the weighted squared error of a fit by regime, over all its recordings."""
+    windows, plant = fit.windows, fit.plant.lean()
+    squares = (fit.residual**2).sum(axis=0)
+    sums: dict[str, float] = {}
+    done = 0
+    for recording, firsts in zip(windows.recordings, windows.firsts, strict=True):
+        squared = np.full(len(recording), np.nan)
+        for k, first in enumerate(firsts, start=done):
+            squared[first : first + windows.length] = squares[k]
+        done += len(firsts)
+        for name, samples in regimes(plant, recording).items():
+            sums[name] = sums.get(name, 0.0) + float(np.nansum(squared[samples]))
+    total = float(squares.sum())
+    found = {name: part / total if total > 0 else 0.0 for name, part in sums.items()}
     return dict(sorted(found.items(), key=lambda item: -item[1]))
 
 
