@@ -1,0 +1,74 @@
+"""What there is, as text: plants, effects and studies."""
+
+from __future__ import annotations
+
+import inspect
+
+from studies.text import columns, shown
+from workbench.effects import CATALOGUE
+from workbench.errors import InputError, Message, listed, nearest
+from workbench.plants import PLANTS
+from workbench.units import public_name
+
+
+def plants_text() -> str:
+    """One line per plant: name, commands and outputs, and what it is."""
+    rows = []
+    for name, build in PLANTS.items():
+        plant = build()
+        given = [*(s.name for s in plant.commands), *(s.name for s in plant.measured_inputs)]
+        module = inspect.getmodule(build)
+        what = (inspect.getdoc(module) or "").split("\n\n")[0].replace("\n", " ")
+        rows.append((name, _names(given), _names(plant.measured), what))
+    return columns(("plant", "inputs", "outputs", "what it is"), rows)
+
+
+def effects_text() -> str:
+    """One line per cause of the catalogue: name, balance, and the plants that have a place."""
+    built = {name: build() for name, build in PLANTS.items()}
+    causes = {cause.name: cause for effect in CATALOGUE for cause in effect.causes}
+    rows = []
+    for name, cause in sorted(causes.items()):
+        owners = [
+            p
+            for p, plant in built.items()
+            if any(c.cause.name == name for c in plant.candidates.values())
+        ]
+        rows.append((name, cause.balance.value, ", ".join(owners) or "-", cause.shown_by))
+    return columns(("effect", "balance", "plants", "shown by"), rows)
+
+
+def effects_of_plant_text(name: str) -> str:
+    """One line per cause that a plant has a place for, with what is known of it.
+
+    Raises
+    ------
+    InputError
+        If there is no such plant.
+    """
+    if name not in PLANTS:
+        known = f"one of {listed(PLANTS)}"
+        raise InputError(Message("there is no such plant", name, known, nearest(name, PLANTS)))
+    plant = PLANTS[name]()
+    rows = []
+    for full, candidate in sorted(plant.candidates.items()):
+        known, cause = plant.parameters[candidate.strength], candidate.cause
+        unit = shown(0.0, candidate.strength).partition(" ")[2] or "-"
+        null, typical, now = (
+            shown(value, candidate.strength).partition(" ")[0]
+            for value in (known.null or 0.0, known.typical, plant.values[candidate.strength])
+        )
+        present = "absent" if plant.values[candidate.strength] == known.null else now
+        row = (full, null, typical, unit, present, cause.balance.value, cause.kind.value)
+        rows.append((*row, cause.source))
+    head = ("effect", "null", "typical", "unit", "value", "balance", "kind", "source")
+    return columns(head, rows)
+
+
+def studies_text() -> str:
+    """One line per study."""
+    return "There are no studies yet; `workbench demo` shows the whole loop."
+
+
+def _names(full: list[str] | tuple[str, ...]) -> str:
+    return ", ".join(map(public_name, full)) or "-"

@@ -1,0 +1,18 @@
+"""The command ``workbench``: it parses, calls and prints, and holds no logic of its own.
+
+Whatever takes time to import is imported inside the commands, so that ``--help`` is quick.
+"""
+
+from studies.command_line import catalogue, control, missing, plant, show
+from studies.command_line.application import app
+
+__all__ = ["app", "catalogue", "control", "main", "missing", "plant", "show"]
+
+
+def main() -> None:
+    """Entry point of the command ``workbench``."""
+    app()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,168 @@
+"""What all commands share: the application, their options, and how they answer."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+import time
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperCommand
+
+DONE, NO, WRONG_INPUT, SOLVER_FAILED, STOPPED = 0, 1, 2, 3, 130
+
+app = typer.Typer(
+    name="workbench",
+    help="Pneumatic actuators: simulate, compare with recordings, find the missing effect, control.",
+    add_completion=False,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+
+class Spread(TyperCommand):
+    """A command whose options take several values in a row: ``--validate a.csv b.csv``.
+
+    Only behind an argument, so that options that stand first do not swallow the arguments.
+    """
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        several = {name for p in self.params if p.multiple for name in p.opts}
+        return super().parse_args(ctx, spread(args, several))
+
+
+def spread(args: list[str], several: set[str]) -> list[str]:
+    """Repeat an option before each of its further values."""
+    found: list[str] = []
+    current = ""
+    for arg in args:
+        if arg.startswith("-"):
+            behind = bool(found) and not found[0].startswith("-")
+            current = arg if arg in several and behind else ""
+            found.append(arg)
+        elif current and found[-1] != current:
+            found += [current, arg]
+        else:
+            found.append(arg)
+    return found
+
+
+RigFile = Annotated[Path, typer.Argument(metavar="RIG", help="Rig file (TOML).")]
+Recordings = Annotated[list[Path], typer.Argument(metavar="REC...", help="Recordings.")]
+Train = Annotated[list[Path], typer.Argument(metavar="TRAIN...", help="Recordings to fit.")]
+Validate = Annotated[
+    list[Path] | None,
+    typer.Option("--validate", metavar="REC...", help="Held-out recordings, another manoeuvre."),
+]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")]
+Figures = Annotated[
+    Path | None, typer.Option("--figures", metavar="DIR", help="Write figures into this folder.")
+]
+Json = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Write as JSON too.")]
+Output = Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="File to write.")]
+
+
+@contextmanager
+def answering(quiet: bool = False) -> Iterator[Callable[[str], None]]:
+    """Progress on stderr while a command works; what goes wrong as a message and an exit code."""
+    from workbench.errors import InputError
+
+    begun = time.monotonic()
+
+    def say(message: str) -> None:
+        if not quiet:
+            typer.echo(f"[{time.monotonic() - begun:5.1f} s] {message}", err=True)
+
+    before = warnings.showwarning
+    warnings.showwarning = _warned
+    try:
+        yield say
+    except InputError as error:
+        _stop(str(error), WRONG_INPUT)
+    except (ArithmeticError, _linear_algebra_error()) as error:
+        _stop(str(error), SOLVER_FAILED)
+    except (KeyError, LookupError, ValueError) as error:
+        _stop(str(error.args[0]) if error.args else repr(error), WRONG_INPUT)
+    except OSError as error:
+        _stop(f"{error.filename or ''}: {error.strerror or error}".lstrip(": "), WRONG_INPUT)
+    except KeyboardInterrupt:
+        _stop("stopped; no file is half-written", STOPPED)
+    finally:
+        warnings.showwarning = before
+
+
+def _linear_algebra_error() -> type[Exception]:
+    """Numpy's error, only where numpy is loaded: nothing else can raise it."""
+    numpy = sys.modules.get("numpy")
+    return numpy.linalg.LinAlgError if numpy else ArithmeticError
+
+
+def _stop(message: str, code: int) -> None:
+    typer.echo(f"workbench: {message}", err=True)
+    raise typer.Exit(code)
+
+
+def _warned(message: Warning | str, *_: object, **__: object) -> None:
+    typer.echo(f"warning: {message}", err=True)
+
+
+def command_text() -> str:
+    """The command as it was typed, for what is written beside a figure."""
+    return shlex.join(["workbench", *sys.argv[1:]])
+
+
+def writable(*paths: Path | None) -> None:
+    """Refuse, before any work, a file to write whose name is a folder.
+
+    Raises
+    ------
+    InputError
+        Naming the folder.
+    """
+    from workbench.errors import InputError, Message
+
+    for path in filter(None, paths):
+        if path.is_dir():
+            raise InputError(Message("is a folder", str(path), "the name of a file to write"))
+
+
+def write_json(path: Path | None, document: dict[str, Any]) -> None:
+    """Write a document, if a file is wanted."""
+    if path is None:
+        return
+    import json
+
+    from workbench.errors import whole_file
+
+    with whole_file(path) as unfinished:
+        text = json.dumps(document, indent=2, allow_nan=False)
+        unfinished.write_text(text + "\n", encoding="utf-8")
+
+
+def read_all(rig: Any, paths: list[Path] | None, say: Callable[[str], None]) -> list[Any]:
+    """All recordings of a rig; what is wrong with any of them is said at once.
+
+    Raises
+    ------
+    InputError
+        With the messages of all recordings.
+    """
+    from workbench.errors import InputError
+    from workbench.reading import read_recording
+
+    found, wrong = [], []
+    for path in paths or ():
+        say(f"reading {path}")
+        try:
+            found.append(read_recording(rig, path))
+        except InputError as error:
+            wrong += error.messages
+    if wrong:
+        raise InputError(*wrong)
+    return found

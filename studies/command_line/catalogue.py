@@ -1,0 +1,53 @@
+"""Commands that list what there is: plants, effects, studies."""
+
+from typing import Annotated
+
+import typer
+
+from studies.command_line.application import answering, app
+
+
+@app.command()
+def plants() -> None:
+    """List the plants, one line each.
+
+    \b
+    Example:
+      workbench plants
+    """
+    with answering():
+        from studies.catalogue_text import plants_text
+
+        typer.echo(plants_text())
+
+
+@app.command()
+def effects(
+    plant: Annotated[str | None, typer.Argument(metavar="[PLANT]", help="A plant.")] = None,
+) -> None:
+    """List the effects of the catalogue, or those that a plant may lack, with what is known.
+
+    With PLANT also null value, typical size, unit, balance and source of each.
+
+    \b
+    Example:
+      workbench effects servo_drive
+    """
+    with answering():
+        from studies.catalogue_text import effects_of_plant_text, effects_text
+
+        typer.echo(effects_text() if plant is None else effects_of_plant_text(plant))
+
+
+@app.command()
+def studies() -> None:
+    """List the studies, one line each.
+
+    \b
+    Example:
+      workbench studies
+    """
+    with answering():
+        from studies.catalogue_text import studies_text
+
+        typer.echo(studies_text())

@@ -1,0 +1,85 @@
+"""Commands on a plant and its recordings: simulate, compare."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from studies.command_line.application import (
+    Figures,
+    Json,
+    Output,
+    Quiet,
+    Recordings,
+    RigFile,
+    answering,
+    app,
+    command_text,
+    read_all,
+    writable,
+    write_json,
+)
+
+
+@app.command()
+def simulate(
+    rig: RigFile,
+    inputs: Annotated[Path, typer.Argument(metavar="INPUTS.csv", help="Recorded commands.")],
+    output: Output,
+    quiet: Quiet = False,
+) -> None:
+    """Run the nonlinear plant under recorded commands.
+
+    It starts from the first recorded sample where outputs are recorded too, else from the plant's
+    own initial state.
+
+    \b
+    Example:
+      workbench simulate rig.toml train.csv -o simulated.csv
+    """
+    with answering(quiet) as say:
+        from workbench.comparison.run import read_inputs, run
+        from workbench.reading.writer import write_recording
+        from workbench.rig import load_rig
+
+        writable(output)
+        found = load_rig(rig)
+        recording = read_inputs(found, inputs)
+        say(f"simulating {len(recording)} samples of {recording.name}")
+        write_recording(run(found, recording), output, ambient_pa=found.ambient_pa)
+        typer.echo(f"wrote {output}")
+
+
+@app.command()
+def compare(
+    rig: RigFile,
+    recordings: Recordings,
+    figures: Figures = None,
+    json: Json = None,
+    quiet: Quiet = False,
+) -> None:
+    """Error by signal, horizon and regime, and where the plant fails.
+
+    \b
+    Example:
+      workbench compare rig.toml train.csv validation.csv --figures figures --json errors.json
+    """
+    with answering(quiet) as say:
+        from studies.documents import comparison_document
+        from studies.text_of_results import comparison_text
+        from workbench.comparison import compare
+        from workbench.rig import load_rig
+
+        writable(json)
+        found = load_rig(rig)
+        read = read_all(found, recordings, say)
+        say("comparing: one step, windows, free run")
+        comparison = compare(found, read)
+        write_json(json, comparison_document(comparison))
+        if figures:
+            from studies.figures.comparison import comparison_figures
+            from studies.figures.style import save_all
+
+            save_all(comparison_figures(comparison), figures, command_text())
+            say(f"figures in {figures}")
+        typer.echo(comparison_text(comparison))

@@ -1,0 +1,153 @@
+"""Results as plain dictionaries for JSON; the keys are a contract (interface.md section 4)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import isfinite
+from typing import TYPE_CHECKING, Any
+
+from workbench.units import public_name, si_unit
+
+if TYPE_CHECKING:
+    from workbench.comparison.compare import Comparison
+    from workbench.diagnosis.result import Diagnosis, Law, Ranked, SignalError, Where
+
+Document = dict[str, Any]
+
+
+def comparison_document(found: Comparison) -> Document:
+    """A comparison: errors by horizon and signal, regimes, worst windows."""
+    return {
+        "schema": "workbench.comparison/1",
+        "rig": found.rig_name,
+        "recordings": [
+            {
+                "recording": each.name,
+                "errors": {
+                    horizon: {public_name(name): signal(error, name) for name, error in row.items()}
+                    for horizon, row in each.errors.items()
+                },
+                "by_regime": [
+                    {
+                        "regime": regime.name,
+                        "share_of_error": plain(regime.share_of_error),
+                        "share_of_time": plain(regime.share_of_time),
+                    }
+                    for regime in each.by_regime
+                ],
+                "worst": [
+                    {
+                        "start_s": plain(span.start_s),
+                        "end_s": plain(span.end_s),
+                        "share_of_error": plain(span.share_of_error),
+                    }
+                    for span in each.worst
+                ],
+                "notes": list(each.notes),
+            }
+            for each in found.recordings
+        ],
+    }
+
+
+def diagnosis_document(found: Diagnosis, unit_of: Mapping[str, str]) -> Document:
+    """A diagnosis, with the keys of interface.md section 4."""
+    best = found.best
+    return {
+        "schema": "workbench.diagnosis/1",
+        "rig": found.rig_name,
+        "verdict": found.verdict.value,
+        "effect": best.candidate.cause.name if best else None,
+        "at": best.candidate.place if best else None,
+        "sentence": found.sentence,
+        "ranking": [_ranked(row) for row in found.ranking],
+        "where": _where(found.where) if found.where else None,
+        "law": _law(found.law) if found.law else None,
+        "before": errors(found.before, unit_of),
+        "after": {"train": {}, "validation": {}} | errors(found.after, unit_of),
+        "next_recording": _next_recording(best) if best and best.tied_with else None,
+        "warnings": list(found.warnings),
+    }
+
+
+def errors(
+    sets: Mapping[str, Mapping[str, SignalError]], unit_of: Mapping[str, str]
+) -> dict[str, dict[str, Document]]:
+    """Errors by set and public output name."""
+    return {
+        label: {public_name(name): signal(e, unit_of.get(name, name)) for name, e in row.items()}
+        for label, row in sets.items()
+    }
+
+
+def signal(error: SignalError, name: str) -> Document:
+    """The error of one signal in SI."""
+    return {
+        "rmse": plain(error.rmse),
+        "unit": si_unit(name),
+        "fit_percent": plain(error.fit_percent),
+        "noise": plain(error.noise),
+    }
+
+
+def plain(value: float) -> float | None:
+    """A float that JSON knows; what is not finite is null."""
+    return float(value) if isfinite(value) else None
+
+
+def _ranked(row: Ranked) -> Document:
+    return {
+        "effect": row.candidate.cause.name,
+        "at": row.candidate.place,
+        "kind": row.kind.value,
+        "size": {
+            public_name(name).rpartition(".")[2]: {
+                "value": plain(size.value),
+                "unit": si_unit(name),
+                "std": plain(size.deviation),
+            }
+            for name, size in row.size.items()
+        },
+        "error_drop_train": plain(row.drop_train),
+        "error_drop_validation": plain(row.drop_validation),
+        "tied_with": list(row.tied_with),
+        "compensable": plain(row.compensable),
+        "decided_by": row.decided_by.value,
+        "accepted": row.accepted,
+        "reasons": list(row.reasons),
+    }
+
+
+def _where(where: Where) -> Document:
+    return {
+        "balance": where.balance,
+        "by_balance": {name: plain(gain) for name, gain in where.by_balance.items()},
+        "against": [
+            {"variable": public_name(each.variable), "explains": plain(each.explains)}
+            for each in where.against
+        ],
+        "by_regime": [
+            {"regime": name, "share_of_error": plain(share)}
+            for name, share in where.by_regime.items()
+        ],
+    }
+
+
+def _law(law: Law) -> Document:
+    return {
+        "balance": law.balance,
+        "terms": {name: plain(value) for name, value in law.terms.items()},
+        "ranges": {name: [plain(low), plain(high)] for name, (low, high) in law.ranges.items()},
+        "error_drop_train": plain(law.drop_train),
+        "error_drop_validation": plain(law.drop_validation),
+        "text": law.text,
+    }
+
+
+def _next_recording(best: Ranked) -> Document:
+    """What the catalogue says shows the best of a tie; its gain is not worked out here."""
+    return {
+        "what": best.candidate.cause.shown_by,
+        "separates": [best.candidate.name, *best.tied_with],
+        "expected_gain": None,
+    }

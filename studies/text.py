@@ -1,0 +1,55 @@
+"""Results as text for a terminal: aligned columns, in the units people read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from math import isfinite
+
+from workbench.units import display_scale, display_unit, public_name
+
+
+def columns(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table: numbers to the right, words to the left."""
+    rows = [list(map(str, row)) for row in rows]
+    if not rows:
+        return ""
+    widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]
+    right = [all(_numeric(row[k]) for row in rows) for k in range(len(head))]
+    lines = (
+        "  ".join(
+            word.rjust(width) if flush else word.ljust(width)
+            for word, width, flush in zip(row, widths, right, strict=True)
+        ).rstrip()
+        for row in (list(head), *rows)
+    )
+    return "\n".join(lines)
+
+
+def _numeric(word: str) -> bool:
+    return word == "-" or word.lstrip("-+").replace(" %", "").replace(".", "", 1)[:1].isdigit()
+
+
+def number(value: float, digits: int = 4) -> str:
+    """A number as people write it; a dash where there is none."""
+    if not isfinite(value):
+        return "-"
+    return f"{value:.{digits}g}"
+
+
+def percent(share: float, digits: int = 0) -> str:
+    """A share as a percentage; a dash where there is none."""
+    return f"{100.0 * share:.{digits}f} %" if isfinite(share) else "-"
+
+
+def shown(value: float, name: str, digits: int = 4) -> str:
+    """A quantity in the unit people read it in: ``0.0919 mm^2``."""
+    if not isfinite(value):
+        return "-"
+    return f"{number(display_scale(name).from_si(value), digits)} {display_unit(name)}".strip()
+
+
+def labelled(name: str) -> str:
+    """A quantity in words with its unit, for an axis: ``chamber a pressure (bar)``."""
+    unit = display_unit(name)
+    words = public_name(name).replace(".", " ").replace("_", " ")
+    return f"{words} ({unit})" if unit else words

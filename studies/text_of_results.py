@@ -1,0 +1,142 @@
+"""Comparisons, diagnoses, additions and fits as text."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from studies.text import columns, number, percent, shown
+from workbench.units import public_name
+
+if TYPE_CHECKING:
+    from workbench.comparison.compare import Comparison, RecordingComparison
+    from workbench.diagnosis.result import Diagnosis, Ranked, SignalError
+
+SHOWN_RANKS = 12
+
+Errors = Mapping[str, Mapping[str, "SignalError"]]
+
+
+def comparison_text(found: Comparison) -> str:
+    """Errors by horizon, regimes and worst windows of each recording."""
+    return "\n\n".join(_recording_text(each) for each in found.recordings)
+
+
+def _recording_text(each: RecordingComparison) -> str:
+    errors = columns(
+        ("signal", "horizon", "RMSE", "fit %", "noise"),
+        [
+            (
+                public_name(name),
+                horizon,
+                shown(error.rmse, name),
+                number(error.fit_percent, 3),
+                shown(error.noise, name, 2),
+            )
+            for name in each.measured
+            for horizon, row in each.errors.items()
+            if (error := row.get(name))
+        ],
+    )
+    regimes = columns(
+        ("where the error is", "of the error", "of the time"),
+        [(r.name, percent(r.share_of_error), percent(r.share_of_time)) for r in each.by_regime],
+    )
+    worst = ", ".join(
+        f"{span.start_s:.2f} to {span.end_s:.2f} s ({percent(span.share_of_error)})"
+        for span in each.worst
+    )
+    parts = [f"{each.name}: {each.time_s[-1]:.4g} s", errors, regimes, f"worst: {worst}"]
+    return "\n".join(filter(None, [*parts, *each.notes]))
+
+
+def diagnosis_text(found: Diagnosis, unit_of: Mapping[str, str]) -> str:
+    """Verdict, ranking, where it fails, and errors before and after.
+
+    ``unit_of`` gives the full name, with its unit, of each public output name.
+    """
+    parts = [f"verdict: {found.verdict.value}: {found.sentence}"]
+    parts += [f"warning: {warning}" for warning in found.warnings]
+    parts += ["", ranking_text(found)]
+    if found.where:
+        parts += ["", where_text(found)]
+    if found.after:
+        parts += ["", before_after_text(found.before, found.after, unit_of)]
+    return "\n".join(parts)
+
+
+def ranking_text(found: Diagnosis) -> str:
+    """The best of the ranking as a table."""
+    rows = [
+        (
+            str(place),
+            row.candidate.name,
+            percent(row.drop_train, 1),
+            percent(row.drop_validation, 1),
+            sizes_text(row),
+            row.decided_by.value,
+            _remark(row),
+        )
+        for place, row in enumerate(found.ranking[:SHOWN_RANKS], start=1)
+    ]
+    head = ("", "effect", "drop train", "validation", "size", "by", "")
+    rest = len(found.ranking) - SHOWN_RANKS
+    more = f"\n... and {rest} more, in the JSON" if rest > 0 else ""
+    return columns(head, rows) + more
+
+
+def sizes_text(row: Ranked) -> str:
+    """Strength and forms with their standard deviations."""
+    sizes = (
+        f"{shown(size.value, name, 3)} ± {shown(size.deviation, name, 2)}"
+        for name, size in row.size.items()
+    )
+    return ", ".join(sizes) or "-"
+
+
+def _remark(row: Ranked) -> str:
+    if row.accepted:
+        return f"accepted, tied with {', '.join(row.tied_with)}" if row.tied_with else "accepted"
+    return "; ".join(row.reasons)
+
+
+def where_text(found: Diagnosis) -> str:
+    """Gain by balance, the strongest drivers and the shares of the regimes."""
+    where = found.where
+    assert where is not None
+    gains = sorted(where.by_balance.items(), key=lambda item: -item[1])
+    lines = [
+        "where: " + ", ".join(f"{public_name(k)} {number(v)}" for k, v in gains)
+        + " (log-likelihood gained by an unknown input)"
+    ]  # fmt: skip
+    lines.append(
+        f"missing term of {where.balance} follows "
+        + ", ".join(f"{public_name(d.variable)} {percent(d.explains)}" for d in where.against[:3])
+    )
+    shares = list(where.by_regime.items())[:4]
+    lines.append("error in: " + ", ".join(f"{name} {percent(share)}" for name, share in shares))
+    return "\n".join(lines)
+
+
+def before_after_text(before: Errors, after: Errors, unit_of: Mapping[str, str]) -> str:
+    """RMSE and fit of each output before and after, on each set."""
+    rows = []
+    for label in before:
+        for name, old in before[label].items():
+            new, full = after.get(label, {}).get(name), unit_of.get(name, name)
+            rows.append(
+                (
+                    label,
+                    name,
+                    shown(old.rmse, full),
+                    shown(new.rmse, full) if new else "-",
+                    number(old.fit_percent, 3),
+                    number(new.fit_percent, 3) if new else "-",
+                )
+            )
+    return columns(("set", "signal", "RMSE before", "after", "fit % before", "after"), rows)
+
+
+def unit_names(outputs: tuple[str, ...]) -> dict[str, str]:
+    """Full name of each output by its public name."""
+    return {public_name(name): name for name in outputs} | {name: name for name in outputs}
