@@ -18,7 +18,7 @@ DONE, NO, WRONG_INPUT, SOLVER_FAILED, STOPPED = 0, 1, 2, 3, 130
 
 app = typer.Typer(
     name="workbench",
-    help="Pneumatic actuators: simulate, compare with recordings, find the missing effect, control.",
+    help="Pneumatic actuators: compare, find the missing effect, design and check control.",
     add_completion=False,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
@@ -95,6 +95,11 @@ def answering(quiet: bool = False) -> Iterator[Callable[[str], None]]:
         _stop("stopped; no file is half-written", STOPPED)
     finally:
         warnings.showwarning = before
+
+
+def example(command: str) -> str:
+    """The example at the end of a command's help, kept on its own line."""
+    return f"\b\nExample:\n  {command}"
 
 
 def _linear_algebra_error() -> type[Exception]:

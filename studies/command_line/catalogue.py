@@ -4,34 +4,25 @@ from typing import Annotated
 
 import typer
 
-from studies.command_line.application import answering, app
+from studies.command_line.application import Spread, answering, app, example
 
 
-@app.command()
+@app.command(cls=Spread, epilog=example("workbench plants"))
 def plants() -> None:
-    """List the plants, one line each.
-
-    \b
-    Example:
-      workbench plants
-    """
+    """List the plants, one line each."""
     with answering():
         from studies.catalogue_text import plants_text
 
         typer.echo(plants_text())
 
 
-@app.command()
+@app.command(cls=Spread, epilog=example("workbench effects servo_drive"))
 def effects(
     plant: Annotated[str | None, typer.Argument(metavar="[PLANT]", help="A plant.")] = None,
 ) -> None:
     """List the effects of the catalogue, or those that a plant may lack, with what is known.
 
     With PLANT also null value, typical size, unit, balance and source of each.
-
-    \b
-    Example:
-      workbench effects servo_drive
     """
     with answering():
         from studies.catalogue_text import effects_of_plant_text, effects_text
@@ -39,14 +30,9 @@ def effects(
         typer.echo(effects_text() if plant is None else effects_of_plant_text(plant))
 
 
-@app.command()
+@app.command(cls=Spread, epilog=example("workbench studies"))
 def studies() -> None:
-    """List the studies, one line each.
-
-    \b
-    Example:
-      workbench studies
-    """
+    """List the studies, one line each."""
     with answering():
         from studies.catalogue_text import studies_text
 

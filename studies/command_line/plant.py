@@ -12,16 +12,18 @@ from studies.command_line.application import (
     Quiet,
     Recordings,
     RigFile,
+    Spread,
     answering,
     app,
     command_text,
+    example,
     read_all,
     writable,
     write_json,
 )
 
 
-@app.command()
+@app.command(cls=Spread, epilog=example("workbench simulate rig.toml train.csv -o simulated.csv"))
 def simulate(
     rig: RigFile,
     inputs: Annotated[Path, typer.Argument(metavar="INPUTS.csv", help="Recorded commands.")],
@@ -32,10 +34,6 @@ def simulate(
 
     It starts from the first recorded sample where outputs are recorded too, else from the plant's
     own initial state.
-
-    \b
-    Example:
-      workbench simulate rig.toml train.csv -o simulated.csv
     """
     with answering(quiet) as say:
         from workbench.comparison.run import read_inputs, run
@@ -50,7 +48,12 @@ def simulate(
         typer.echo(f"wrote {output}")
 
 
-@app.command()
+@app.command(
+    cls=Spread,
+    epilog=example(
+        "workbench compare rig.toml train.csv validation.csv --figures figures --json errors.json"
+    ),
+)
 def compare(
     rig: RigFile,
     recordings: Recordings,
@@ -58,12 +61,7 @@ def compare(
     json: Json = None,
     quiet: Quiet = False,
 ) -> None:
-    """Error by signal, horizon and regime, and where the plant fails.
-
-    \b
-    Example:
-      workbench compare rig.toml train.csv validation.csv --figures figures --json errors.json
-    """
+    """Error by signal, horizon and regime, and where the plant fails."""
     with answering(quiet) as say:
         from studies.documents import comparison_document
         from studies.text_of_results import comparison_text

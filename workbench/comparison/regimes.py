@@ -15,6 +15,7 @@ from workbench.fitting.starts import guessed_states, slope
 from workbench.plant import Plant
 from workbench.recording import Recording
 from workbench.simulation import inputs
+from workbench.units import display_unit
 
 RESTING_M_S = 5e-3
 NEAR_SHARE = 0.1  # of the stroke at each end
@@ -33,8 +34,9 @@ def regimes(plant: Plant, recording: Recording) -> dict[str, np.ndarray]:
         closed, size = _closed(plant, signal)
         away = command - closed
         found[f"{member} closed"] = np.abs(away) <= size
-        found[f"{member} open above {closed:.4g}"] = away > size
-        found[f"{member} open below {closed:.4g}"] = away < -size
+        centre = f"{closed:.4g} {display_unit(signal)}".strip()
+        found[f"{member} open above {centre}"] = away > size
+        found[f"{member} open below {centre}"] = away < -size
     place = _position(plant, recording)
     if place is not None:
         found |= _motion(plant, recording, place)

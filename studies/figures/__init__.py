@@ -1,0 +1,1 @@
+"""Figures of comparisons, diagnoses, modes and closed loops, all in one style."""

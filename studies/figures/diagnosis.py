@@ -1,0 +1,132 @@
+"""Figures of a diagnosis: the ranking, the balances, and the term that is missing."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from studies.figures.style import (
+    BLUE,
+    COLUMN_IN,
+    GREY,
+    ORANGE,
+    PAGE_IN,
+    RED,
+    new_figure,
+    styled,
+    thinned,
+)
+from studies.text import labelled
+from workbench.units import display_scale, display_unit, public_name
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from workbench.diagnosis.result import Dependence, Diagnosis, Where
+
+SHOWN = 10
+
+
+def diagnosis_figures(found: Diagnosis, prefix: str = "") -> dict[str, Figure]:
+    """All figures of a diagnosis, by file name."""
+    figures = {f"{prefix}ranking": ranking_figure(found)} if found.ranking else {}
+    if found.where:
+        figures[f"{prefix}missing_term"] = missing_term_figure(found.where)
+    return figures
+
+
+def ranking_figure(found: Diagnosis) -> Figure:
+    """How much of the misfit each effect takes away, on both sets; ties share a bracket."""
+    rows = found.ranking[:SHOWN]
+    leader = rows[0]
+    tied = {leader.candidate.name, *leader.tied_with} if leader.tied_with else set()
+    with styled():
+        figure = new_figure(COLUMN_IN, 0.9 + 0.27 * len(rows))
+        axes = figure.subplots()
+        places = np.arange(len(rows))
+        train = [100.0 * max(row.drop_train, 0.0) for row in rows]
+        held_out = [100.0 * max(np.nan_to_num(row.drop_validation), 0.0) for row in rows]
+        names = [_ranked_name(row.candidate.name, tied) for row in rows]
+        axes.set_yticks(places, names)
+        axes.barh(places - 0.2, train, 0.38, color=BLUE, label="training")
+        axes.barh(places + 0.2, held_out, 0.38, color=ORANGE, hatch="////", label="validation")
+        for place, row in zip(places, rows, strict=True):
+            if row.accepted:
+                axes.get_yticklabels()[place].set_fontweight("bold")
+        axes.invert_yaxis()
+        axes.set_xlim(0.0, 105.0)
+        axes.set_xlabel("drop of the misfit beyond noise (%)")
+        told = "bold: accepted" + ("; =: cannot be told apart here" if tied else "")
+        axes.set_title(f"{found.verdict.value.replace('_', ' ')} ({told})")
+        axes.legend(loc="lower right")
+    return figure
+
+
+def _ranked_name(name: str, tied: set[str]) -> str:
+    return f"= {name}" if name in tied else name
+
+
+def missing_term_figure(where: Where) -> Figure:
+    """Gain by balance, the missing term in time, and against what drives it most."""
+    strongest = [d for d in where.against if d.bins.shape[1]][:2]
+    with styled():
+        figure = new_figure(PAGE_IN, 3.6)
+        top, bottom = figure.subplots(2, 1, height_ratios=(1, 1.3), squeeze=True), None
+        grid = top[0].get_gridspec()
+        for axes in top:
+            axes.remove()
+        whole = figure.add_subplot(grid[0])
+        inner = grid[1].subgridspec(1, 1 + max(len(strongest), 1))
+        bottom = [figure.add_subplot(inner[k]) for k in range(1 + len(strongest))]
+        _draw_term(whole, where)
+        _draw_balances(bottom[0], where)
+        for axes, dependence in zip(bottom[1:], strongest, strict=True):
+            _draw_dependence(axes, where, dependence)
+    return figure
+
+
+def _term(where: Where) -> tuple[float, str]:
+    """Factor from SI to what people read, and the axis label of the missing term."""
+    factor = 1.0 / display_scale(where.term_name).factor
+    words = public_name(where.term_name).replace("_", " ")
+    return factor, f"missing {words} ({display_unit(where.term_name)})"
+
+
+def _draw_term(axes: Axes, where: Where) -> None:
+    factor, label = _term(where)
+    time_s, term, spread = thinned(where.time_s, factor * where.term, factor * where.term_deviation)
+    axes.fill_between(time_s, term - spread, term + spread, color=BLUE, alpha=0.2, linewidth=0)
+    axes.plot(time_s, term, color=BLUE, linewidth=0.6, label="missing term, one deviation shaded")
+    axes.set_xlabel("time (s)")
+    axes.set_ylabel(label)
+    axes.set_title(f"what the balance {public_name(where.balance)} lacks")
+    axes.legend(loc="upper right")
+
+
+def _draw_balances(axes: Axes, where: Where) -> None:
+    gains = sorted(where.by_balance.items(), key=lambda item: -item[1])
+    places = np.arange(len(gains))
+    axes.set_yticks(places, [name.replace(".", "\n").replace("_", " ") for name, _ in gains])
+    colours = [RED if name == where.balance else GREY for name, _ in gains]
+    axes.barh(places, [max(gain, 0.0) for _, gain in gains], 0.6, color=colours)
+    axes.invert_yaxis()
+    axes.set_xlabel("gained log-likelihood (-)")
+    axes.set_title("which balance")
+
+
+def _draw_dependence(axes: Axes, where: Where, dependence: Dependence) -> None:
+    factor, label = _term(where)
+    name = dependence.variable
+    rated = name.startswith("rate of ")
+    plain = name.removeprefix("rate of ")
+    per = 1.0 / display_scale(plain).factor
+    centres, means, spreads = dependence.bins * np.array([[per], [factor], [factor]])
+    axes.fill_between(centres, means - spreads, means + spreads, color=BLUE, alpha=0.2, linewidth=0)
+    axes.plot(centres, means, "o-", color=BLUE, markersize=2.5, label="mean, one deviation shaded")
+    axes.axhline(0.0, color=GREY, linewidth=0.6)
+    shown = labelled(plain)
+    axes.set_xlabel(f"rate of {shown[:-1]}/s)" if rated else shown)
+    axes.set_ylabel(label)
+    axes.set_title(f"explains {100.0 * dependence.explains:.0f} %")

@@ -1,0 +1,135 @@
+"""One style for all figures, and how they are saved: PDF, SVG, what is drawn, and the command.
+
+Widths of 3.5 in and 7.16 in are one and two columns of a journal.  Colours are those of Okabe and
+Ito, which colour-blind people tell apart, with changing line styles for prints in grey.  Two runs
+give the same bytes.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from workbench.errors import whole_file
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+COLUMN_IN, PAGE_IN = 3.5, 7.16
+BLUE, ORANGE, GREEN, RED = "#0072B2", "#E69F00", "#009E73", "#D55E00"
+PURPLE, SKY, BLACK, GREY = "#CC79A7", "#56B4E9", "#000000", "0.6"
+MOST_POINTS = 2000  # of a curve; more are not seen and swell the files
+
+_COLOURS = (BLUE, RED, GREEN, ORANGE, PURPLE, SKY, BLACK)
+_LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1)), (0, (3, 1)), (0, (1, 1)))
+
+
+@contextmanager
+def styled() -> Iterator[None]:
+    """The style while a figure is made and saved."""
+    import matplotlib
+    from cycler import cycler
+
+    cycle = cycler(color=_COLOURS) + cycler(linestyle=_LINES)
+    style = {
+        "font.family": "STIXGeneral",
+        "mathtext.fontset": "stix",
+        "font.size": 8,
+        "axes.titlesize": 8,
+        "legend.fontsize": 7,
+        "legend.frameon": False,
+        "axes.prop_cycle": cycle,
+        "axes.spines.top": False,
+        "axes.spines.right": False,
+        "axes.linewidth": 0.6,
+        "lines.linewidth": 0.9,
+        "grid.linewidth": 0.4,
+        "grid.alpha": 0.4,
+        "axes.grid": True,
+        "axes.axisbelow": True,
+        "pdf.fonttype": 42,
+        "svg.fonttype": "path",
+        "svg.hashsalt": "workbench",
+        "figure.constrained_layout.use": True,
+    }
+    with matplotlib.rc_context(style):
+        yield
+
+
+def new_figure(width_in: float, height_in: float) -> Figure:
+    """An empty figure, to be filled inside :func:`styled`."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width_in, height_in), layout="constrained")
+
+
+def thinned(*columns: np.ndarray) -> list[np.ndarray]:
+    """Columns of equal length with no more points than can be seen."""
+    every = max(len(columns[0]) // MOST_POINTS, 1)
+    return [column[::every] for column in columns]
+
+
+def save_all(figures: Mapping[str, Figure], folder: Path, command: str) -> list[Path]:
+    """Save figures by file name without ending; the SVG files are given back."""
+    return [save(figure, folder / name, command) for name, figure in figures.items()]
+
+
+def save(figure: Figure, stem: Path, command: str) -> Path:
+    """PDF, SVG, CSV of the curves and bars, and the command that made them; gives the SVG."""
+    dateless = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}
+    with styled():
+        for ending, metadata in dateless.items():
+            with whole_file(stem.with_name(f"{stem.name}.{ending}")) as unfinished:
+                figure.savefig(unfinished, format=ending, metadata=metadata)
+    with whole_file(stem.with_name(f"{stem.name}.csv")) as unfinished:
+        _write_drawn(figure, unfinished)
+    with whole_file(stem.with_name(f"{stem.name}.txt")) as unfinished:
+        unfinished.write_text(command + "\n", encoding="utf-8")
+    return stem.with_name(f"{stem.name}.svg")
+
+
+def _write_drawn(figure: Figure, path: Path) -> None:
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(("panel", "curve", "x", "y"))
+        for number, axes in enumerate(figure.axes, start=1):
+            panel = axes.get_title() or axes.get_ylabel() or axes.get_xlabel() or str(number)
+            for curve, x, y in _curves(axes):
+                writer.writerows(
+                    (panel, curve, _short(a), _short(b)) for a, b in zip(x, y, strict=True)
+                )
+
+
+def _curves(axes: Axes) -> Iterator[tuple[str, list, list]]:
+    """Label, x and y of each line, point cloud and group of bars."""
+    for line in axes.lines:
+        yield str(line.get_label()), list(line.get_xdata()), list(line.get_ydata())
+    for cloud in axes.collections:
+        points = np.ma.getdata(cloud.get_offsets())
+        if len(points) > 1:
+            yield str(cloud.get_label()), list(points[:, 0]), list(points[:, 1])
+    for bars in axes.containers:
+        if not hasattr(bars, "patches"):
+            continue
+        flat = getattr(bars, "orientation", "vertical") == "horizontal"
+        ticks = (axes.get_yticks(), axes.get_yticklabels()) if flat else (
+            axes.get_xticks(), axes.get_xticklabels()
+        )  # fmt: skip
+        words = {round(float(at), 6): label.get_text() for at, label in zip(*ticks, strict=True)}
+        sizes = [p.get_width() if flat else p.get_height() for p in bars.patches]
+        middles = [
+            p.get_y() + p.get_height() / 2 if flat else p.get_x() + p.get_width() / 2
+            for p in bars.patches
+        ]
+        nearest = [min(words, key=lambda at, m=m: abs(at - m), default=m) for m in middles]
+        yield str(bars.get_label()), [words.get(at, at) for at in nearest], sizes
+
+
+def _short(value: object) -> str:
+    return value if isinstance(value, str) else f"{float(value):.6g}"
