@@ -13,7 +13,7 @@ def inputs(plant: Plant, recording: Recording) -> tuple[np.ndarray, np.ndarray]:
 
     Causes in time (delay, pause) act here, on the sampled sequences.
     """
-    model, dt = plant.model, recording.sample_time_s
+    dt = recording.sample_time_s
 
     def prepared(channel: str) -> np.ndarray:
         values = recording[channel]
@@ -21,8 +21,8 @@ def inputs(plant: Plant, recording: Recording) -> tuple[np.ndarray, np.ndarray]:
             values = member.resample(channel, values, dt)
         return values
 
-    groups = (model.commands, model.measured_inputs)
-    u, d = ([prepared(name) for name in group] for group in groups)
+    groups = (plant.commands, plant.measured_inputs)
+    u, d = ([prepared(signal.name) for signal in group] for group in groups)
     n = len(recording)
     return np.reshape(u, (len(u), n)), np.reshape(d, (len(d), n))
 

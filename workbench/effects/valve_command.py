@@ -20,6 +20,8 @@ from workbench.effect import (
     strength,
 )
 
+FADING_V = 0.01  # half-width of a band below which its centre loses its meaning
+
 
 @dataclass(frozen=True, kw_only=True)
 class ValveOffset(Effect):
@@ -103,10 +105,11 @@ class ValveLag(Effect):
 class DeadZone(Effect):
     """Overlap of the spool: a band of commands around the centre that opens nothing.
 
-    u -> u_c + R (u - u_c - w) / (R - w)  above the band,  u_c inside,  likewise below
+    u -> u_n + R (u' - u_n - w) / (R - w)  above the band,  u_n inside,  likewise below
 
-    with R the distance from centre to full opening on that side, so that full command is full
-    opening for every half-width w.
+    with u' = u - (u_c - u_n), u_c the centre of the band, u_n the valve's own centre and R the
+    distance from that to full command, so that full command is full opening for every half-width
+    w.  A band beside the valve's centre is an offset of the command; it fades with the band.
 
     Source: paper 002 Fig. 5 and Table 3 (zms 4.53 V, zmd 5.37 V); the rescaling is the convention
     of physics.md 2.4.
@@ -127,26 +130,35 @@ class DeadZone(Effect):
     signal: str
     half_width_v: Expression = strength(typical=0.6, upper=2.0, deviation=0.02)
     centre_v: Expression = form(5.0, lower=0.1, upper=9.9, deviation=0.02)
+    neutral_v: Expression = form(5.0, lower=0.1, upper=9.9)
     full_v: Expression = form(10.0, lower=1.0, upper=24.0)
+
+    @property
+    def shift_v(self) -> Expression:
+        """How far the band lies beside the valve's centre; nothing where there is no band."""
+        present = 1.0 - ca.exp(-self.half_width_v / FADING_V)
+        return present * (self.centre_v - self.neutral_v)
 
     def alter(self, signal: str, value: Expression, now: Conditions) -> Expression:
         if signal != self.signal:
             return value
-        offset_v, w = value - self.centre_v, self.half_width_v
-        above_v, below_v = self.full_v - self.centre_v, self.centre_v
+        entering = value - self.shift_v
+        offset_v, w = entering - self.neutral_v, self.half_width_v
+        above_v, below_v = self.full_v - self.neutral_v, self.neutral_v
         above = ca.fmax(offset_v - w, 0.0) * (above_v / (above_v - w))
         below = ca.fmin(offset_v + w, 0.0) * (below_v / (below_v - w))
-        return value + (above + below - offset_v)  # exactly the value where there is no zone
+        return entering + (above + below - offset_v)  # exactly the value where there is no zone
 
     def undo(self, wanted_v: float) -> float:
         """The command that comes out as ``wanted_v``: what a controller sends to jump the band."""
-        offset_v, w = wanted_v - self.centre_v, self.half_width_v
-        above_v, below_v = self.full_v - self.centre_v, self.centre_v
+        offset_v, w = wanted_v - self.neutral_v, self.half_width_v
+        above_v, below_v = self.full_v - self.neutral_v, self.neutral_v
+        centre_v = self.neutral_v + self.shift_v
         if offset_v > 0:
-            return float(self.centre_v + w + offset_v * (above_v - w) / above_v)
+            return float(centre_v + w + offset_v * (above_v - w) / above_v)
         if offset_v < 0:
-            return float(self.centre_v - w + offset_v * (below_v - w) / below_v)
-        return float(self.centre_v)
+            return float(centre_v - w + offset_v * (below_v - w) / below_v)
+        return float(centre_v)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,7 +13,8 @@ Source: diagnosis.md 1.2 and 1.4; Golub and Pereyra's separable least squares in
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from workbench.plant import Plant
 PARAMETER_STEP = 0.25  # of the scale of an unknown
 START_STEP = 0.25  # of the deviation of a start state
 DAMPINGS = (0.0, 0.1, 1.0, 10.0)
+AGAIN = 0.05  # relative fall of the cost above which derivatives are used once more
 CONVERGED = 2e-3  # relative fall of the cost below which a fit has converged
 
 
@@ -108,32 +110,61 @@ def fit_windows(
 ) -> Fit:
     """Fit the unknowns and the start states; see the module's docstring.
 
-    Every step is taken only if the cost falls; a batch of damped steps is tried at once.
+    Every step is taken only if the cost falls; a batch of damped steps is tried at once.  As long
+    as a step halves what the last one gained or better, the next uses the same derivatives again:
+    they are the dear part.
     """
     point = start or Point(unknowns.scaled(windows.plant.values), windows.start)
     chi2, cost = (v[0] for v in _costs(windows, unknowns, [point]))
-    converged = False
+    at, fresh, converged = None, False, False
     for _ in range(iterations):
-        steps = _damped_steps(linearise(windows, unknowns, point), unknowns)
-        trials = [
-            Point(unknowns.clipped(point.t + dt), point.starts + dx * windows.start_deviation)
-            for dt, dx in steps
-        ]
+        if at is None:
+            at, fresh = linearise(windows, unknowns, point), True
+        trials = _trials(windows, unknowns, at, point)
         chi2s, costs = _costs(windows, unknowns, trials)
         best = int(np.argmin(costs))
-        if not costs[best] < cost:
-            converged = True
+        fall = (cost - costs[best]) / max(cost, 1e-12)
+        if fall > 0:
+            point, chi2, cost = trials[best], chi2s[best], costs[best]
+        converged = fall < CONVERGED
+        if converged and fresh:
             break
-        converged = bool(costs[best] > (1.0 - CONVERGED) * cost)
-        point, chi2, cost = trials[best], chi2s[best], costs[best]
-        if converged:
-            break
+        stale = fall < AGAIN
+        if not stale:
+            at, fresh = _moved(windows, unknowns, at, point), False
+        else:
+            at = None
     return Fit(windows, unknowns, point, float(chi2), float(cost), converged)
 
 
-def refit_starts(windows: Windows, iterations: int = 4) -> Fit:
-    """Only the start states move: how well a plant that is given predicts a recording."""
-    nothing = Unknowns((), *(np.zeros(0) for _ in range(5)))
+def _trials(
+    windows: Windows, unknowns: Unknowns, at: Linearised, point: Point
+) -> list[Point]:
+    """Damped steps from a point, within bounds."""
+    return [
+        Point(unknowns.clipped(point.t + dt), point.starts + dx * windows.start_deviation)
+        for dt, dx in _damped_steps(at, unknowns)
+    ]
+
+
+def _moved(windows: Windows, unknowns: Unknowns, at: Linearised, point: Point) -> Linearised:
+    """The same derivatives with the residual of another point."""
+    r = windows.residuals([_plant_at(windows, unknowns, point.t)], point.starts)[0]
+    away = ((point.starts - windows.start) / windows.start_deviation).T
+    rows = r.transpose(1, 0, 2).reshape(len(windows), -1)
+    return replace(at, point=point, residual=np.concatenate([rows, away], axis=1))
+
+
+def best_start(windows: Windows, unknowns: Unknowns, points: list[Point]) -> Point:
+    """The point of least cost, all run in one batch."""
+    return points[int(np.argmin(_costs(windows, unknowns, points)[1]))]
+
+
+def refit_starts(
+    windows: Windows, values: Mapping[str, float] | None = None, iterations: int = 4
+) -> Fit:
+    """Only the start states move: how well a plant with given values predicts a recording."""
+    nothing = Unknowns((), *(np.zeros(0) for _ in range(5)), held=values or {})
     return fit_windows(windows, nothing, iterations=iterations)
 
 

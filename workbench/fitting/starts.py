@@ -22,6 +22,7 @@ from workbench.plant import Plant
 from workbench.recording import Recording
 
 SMOOTHING_SAMPLES = 15  # of the parabola through recorded values that gives their slope
+CHUNK = 500  # samples that are followed in one call
 OBSERVED_MASS_SHARE = 0.01  # standard deviation of a gas mass that was followed
 
 
@@ -78,9 +79,25 @@ def _follow_gas(plant: Plant, chamber: Chamber, recording: Recording, states: np
     flow = _flow_from_energy(plant, chamber, row)
     for first, last in zip(recording.starts, (*recording.starts[1:], len(recording)), strict=True):
         columns = (v[:, first:last] for v in (states[0], rate[None, :], u, d))
-        masses = flow.mapaccum(last - first)(states[0, row, first], *columns, p, dt).full().ravel()
+        masses = _folded(flow, states[0, row, first], [*columns], p, dt)
         states[0, row, first + 1 : last] = masses[:-1]
         states[1, row, first:last] = OBSERVED_MASS_SHARE * np.median(masses)
+
+
+def _folded(
+    flow: ca.Function, mass: float, columns: list[np.ndarray], p: np.ndarray, dt: float
+) -> np.ndarray:
+    """The followed mass after every sample, shape (n,), in chunks: a long graph is dear to build."""
+    n = columns[0].shape[1]
+    chunk = flow.mapaccum(CHUNK)
+    found = np.zeros(0)
+    for first in range(0, n, CHUNK):
+        part = [c[:, first : first + CHUNK] for c in columns]
+        short = CHUNK - part[0].shape[1]
+        part = [np.pad(c, ((0, 0), (0, short)), mode="edge") for c in part]
+        found = np.append(found, chunk(mass, *part, p, dt).full().ravel())
+        mass = found[-1]
+    return found[:n]
 
 
 def _flow_from_energy(plant: Plant, chamber: Chamber, row: int) -> ca.Function:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -17,7 +17,8 @@ class Unknowns:
     """Free parameters with their prior, bounds and steps for differences; each array (n_p,).
 
     A fit moves t = (value - prior) / scale.  ``precision`` is the prior's weight on t**2, 1 for a
-    parameter with a prior and nearly 0 for an added cause.
+    parameter with a prior and nearly 0 for an added cause.  ``held`` are values that stay as they are
+    but differ from the plant's.
     """
 
     names: tuple[str, ...]
@@ -26,14 +27,15 @@ class Unknowns:
     lower: np.ndarray
     upper: np.ndarray
     precision: np.ndarray
+    held: Mapping[str, float] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.names)
 
     def values(self, t: np.ndarray) -> dict[str, float]:
         """Parameter values at scaled unknowns, kept within their bounds."""
-        raw = self.prior + self.scale * t
-        return dict(zip(self.names, np.clip(raw, self.lower, self.upper).tolist(), strict=True))
+        raw = np.clip(self.prior + self.scale * t, self.lower, self.upper)
+        return {**self.held, **dict(zip(self.names, raw.tolist(), strict=True))}
 
     def scaled(self, values: Mapping[str, float]) -> np.ndarray:
         """Scaled unknowns of parameter values, shape (n_p,)."""
@@ -91,5 +93,5 @@ def nominal_unknowns(
 
 
 def _size(plant: Plant, name: str) -> float:
-    """A tenth of typical: the step in which an added strength or form is counted."""
-    return 0.1 * abs(plant.parameters[name].typical)
+    """A tenth of typical, or of one: the step in which an added strength or form is counted."""
+    return 0.1 * (abs(plant.parameters[name].typical) or 1.0)

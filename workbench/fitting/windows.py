@@ -1,8 +1,8 @@
 """Recordings cut into short windows whose start states are free, and the model run on all at once.
 
 Positions integrate: over a whole recording every small error of a flow or a force drifts away.
-Over short windows forces and flows stay visible and drift is cut (diagnosis.md 1.1).  A tenth of a
-second is two or three pressure time constants of a servo drive; where the slide sticks, longer
+Over short windows forces and flows stay visible and drift is cut (diagnosis.md 1.1).  Two
+tenths of a second are a few pressure time constants of a servo drive; where the slide sticks, longer
 windows run across break-aways and are far from linear in anything (diagnosis.md 4.5).
 
 Residuals are divided by a *scale* per output and window.  Sensor noise alone is a poor one: with a
@@ -33,7 +33,7 @@ from workbench.plant import Plant
 from workbench.recording import Recording
 from workbench.simulation import inputs
 
-WINDOW_S = 0.1
+WINDOW_S = 0.2
 UNSEEN_PENALTY = 1e3  # residual in standard deviations of a sample that could not be simulated
 ACTIVE = 5.0  # noise deviations of an output that moves within a window
 OUTLYING = 3.0  # windows worse than this many typical errors count no more than one that is
@@ -127,10 +127,8 @@ class Windows:
             np.maximum(_median_where(~moves, correlated), 1.0),
             np.maximum(_median_where(moves, correlated), 1.0),
         )
-        expected = model.scale(self.activity, noise, correlated=False)
-        excess = np.maximum(size / (OUTLYING * expected), 1.0)
-        scale = model.scale(self.activity, noise) * excess
-        return replace(self, scale=scale, errors=model)
+        plain = replace(self, scale=model.scale(self.activity, noise), errors=model)
+        return plain.capped(residual * (self.scale / plain.scale)[:, :, None])
 
     @cached_property
     def activity(self) -> np.ndarray:
@@ -147,6 +145,13 @@ class Windows:
         """The same windows with the error shares of others: a held-out recording's yardstick."""
         scale = other.errors.scale(self.activity, self.noise[:, None])
         return replace(self, scale=scale, errors=other.errors)
+
+    def capped(self, residual: np.ndarray) -> Windows:
+        """The same windows, those far worse than typical counting no more than others."""
+        recorded = np.maximum((self.weight > 0).sum(axis=2), 1)
+        size = self.scale * np.sqrt((residual**2).sum(axis=2) / recorded)
+        expected = self.errors.scale(self.activity, self.noise[:, None], correlated=False)
+        return replace(self, scale=self.scale * np.maximum(size / (OUTLYING * expected), 1.0))
 
     def with_plant(self, plant: Plant) -> Windows:
         """The same windows for a plant with other effects; states it shares keep their start."""

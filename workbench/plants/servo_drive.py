@@ -103,6 +103,7 @@ def servo_drive() -> Plant:
                 name="valve_dead_zone",
                 signal=COMMAND,
                 centre_v=CENTRE_V,
+                neutral_v=CENTRE_V,
                 half_width_v=HALF_WIDTH_V,
             ),
             FivePortValve(

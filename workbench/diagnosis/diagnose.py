@@ -1,0 +1,220 @@
+"""One round of diagnosis: which physical effect is missing.
+
+Prior fit, projected profile scan over the catalogue, refits of the best few, judgement on a held-out
+recording, ties, and the verdict in words.  Nothing is changed and nothing is written.
+
+Source: diagnosis.md 1.2 to 1.9.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from workbench.diagnosis.errors import signal_errors
+from workbench.diagnosis.judge import SHARE_REASON, reasons_against, ties
+from workbench.diagnosis.law import empirical_law
+from workbench.diagnosis.problem import Problem, pose, split
+from workbench.diagnosis.refit import Refit, refit
+from workbench.diagnosis.result import DecidedBy, Diagnosis, Law, Ranked, Verdict
+from workbench.diagnosis.scan import Profile, scan
+from workbench.diagnosis.shifts import LEAVES_PRIOR, Shift, shifts
+from workbench.diagnosis.where import locate
+from workbench.effect import Kind
+from workbench.recording import Recording
+from workbench.rig import Rig
+
+REFITTED = 5  # candidates that are followed beyond the scan at the most
+ALWAYS_REFITTED = 3
+WORTH_A_REFIT = 0.25  # of the best drop of the scan
+CERTAIN_SHARE = 0.5  # an accepted candidate above it needs no comparison with an empirical law
+LAW_MARGIN = 0.15  # by how much of the misfit a law must beat the catalogue
+
+Progress = Callable[[str], None]
+
+
+def silent(message: str) -> None:
+    """Progress that nobody reads."""
+
+
+def diagnose(
+    rig: Rig,
+    train: Sequence[Recording],
+    validation: Sequence[Recording] = (),
+    progress: Progress = silent,
+) -> Diagnosis:
+    """Which effect of the catalogue is missing, judged on held-out recordings.
+
+    Without ``validation`` the last third of each recording is held out, and the verdict is at most
+    a tie, with a warning.
+
+    Raises
+    ------
+    ValueError
+        If the recordings are too short for a window or show no noise.
+    """
+    warnings: tuple[str, ...] = ()
+    held_out = bool(validation)
+    if not held_out:
+        train, validation = split(train)
+        warnings = ("no validation recording: the last third is held out, which is weak evidence",)
+    progress("prior fit")
+    problem = pose(rig, train, validation)
+    if not problem.base.converged:
+        warnings += ("the prior fit did not converge: the ranking is provisional",)
+    progress("scan of the catalogue")
+    profiles = _scanned(problem)
+    refits = []
+    for rank, profile in enumerate(profiles[:REFITTED]):
+        if rank < ALWAYS_REFITTED or profile.drop > WORTH_A_REFIT * profiles[0].drop:
+            progress(f"refit with {profile.candidate.name}")
+            refits.append(refit(problem, profile))
+    refits.sort(key=lambda each: -each.drop_train)
+    ranking = _ranking(problem, profiles, refits, shifts(problem))
+    progress("where it fails")
+    where = locate(problem, train)
+    law = _law(problem, ranking, where.balance if where else None, progress)
+    verdict = _verdict(ranking, law, held_out)
+    best = next((r for r in refits if ranking and r.candidate == ranking[0].candidate), None)
+    return Diagnosis(
+        rig_name=rig.name,
+        verdict=verdict,
+        sentence=_sentence(verdict, ranking, law),
+        ranking=ranking,
+        where=where,
+        before=_errors(problem.base, problem.base_validation),
+        after=_errors(best.fit, best.validation) if best else {},
+        law=law if verdict is Verdict.NOT_IN_CATALOGUE else None,
+        warnings=warnings,
+        base=problem.base,
+        base_validation=problem.base_validation,
+    )
+
+
+def _scanned(problem: Problem) -> list[Profile]:
+    """Profiles of the causes that are not there and not shifts of fitted parameters."""
+    base = problem.base
+    values = base.plant.values
+    known = problem.whole.parameters
+    absent = [
+        c
+        for c in problem.whole.candidates.values()
+        if c.held is None and c not in problem.added
+        and (c.cause.tolerated or values.get(c.strength, known[c.strength].null)
+             == known[c.strength].null)
+    ]  # fmt: skip
+    return scan(problem.whole, base.windows, base.unknowns, base.point, absent)
+
+
+def _ranking(
+    problem: Problem, profiles: list[Profile], refits: list[Refit], moved: list[Shift]
+) -> tuple[Ranked, ...]:
+    """All candidates, best first: refits, shifts of parameters, then the rest by the scan."""
+    by_name = {profile.candidate.name: profile for profile in profiles}
+    tied: dict[str, tuple[str, ...]] = {}
+    if refits:
+        group = (refits[0], *ties(refits[0], refits[1:], by_name))
+        names = [each.candidate.name for each in group]
+        tied = {name: tuple(n for n in names if n != name) for name in names}
+    rows = [_refitted(problem, r, by_name, tied.get(r.candidate.name, ())) for r in refits]
+    rows += [_shifted(shift) for shift in moved]
+    followed = {r.candidate.name for r in refits}
+    rows += [_scanned_row(problem, p) for p in profiles if p.candidate.name not in followed]
+    return tuple(sorted(rows, key=lambda row: -row.drop_train))
+
+
+def _refitted(
+    problem: Problem, each: Refit, profiles: dict[str, Profile], tied: tuple[str, ...]
+) -> Ranked:
+    against = reasons_against(problem.base, each)
+    return Ranked(
+        candidate=each.candidate,
+        kind=Kind.EFFECT,
+        size=each.size,
+        drop_train=each.drop_train,
+        drop_validation=each.drop_validation,
+        tied_with=tied,
+        compensable=profiles[each.candidate.name].compensation,
+        decided_by=DecidedBy.REFIT,
+        accepted=not against,
+        reasons=against,
+        fit=each.fit,
+    )
+
+
+def _shifted(shift: Shift) -> Ranked:
+    """A shift counts in the ranking only where it leaves its prior."""
+    stays = (f"{shift.name} stays within {LEAVES_PRIOR:g} deviations of its prior",)
+    return Ranked(
+        candidate=shift.candidate,
+        kind=Kind.PARAMETER,
+        size={shift.name: shift.size},
+        drop_train=shift.drop if shift.leaves else 0.0,
+        drop_validation=float("nan"),
+        tied_with=(),
+        compensable=1.0,
+        decided_by=DecidedBy.SCAN,
+        accepted=False,
+        reasons=("only a shift of a fitted parameter",) if shift.leaves else stays,
+    )
+
+
+def _scanned_row(problem: Problem, profile: Profile) -> Ranked:
+    return Ranked(
+        candidate=profile.candidate,
+        kind=Kind.EFFECT,
+        size={},
+        drop_train=profile.drop / problem.misfit,
+        drop_validation=float("nan"),
+        tied_with=(),
+        compensable=profile.compensation,
+        decided_by=DecidedBy.SCAN,
+        accepted=False,
+        reasons=("not among the best of the scan",),
+    )
+
+
+def _law(
+    problem: Problem, ranking: tuple[Ranked, ...], balance: str | None, progress: Progress
+) -> Law | None:
+    """An empirical law, unless the catalogue explains most of the misfit already."""
+    leader = ranking[0] if ranking else None
+    if leader and leader.accepted and leader.drop_train >= CERTAIN_SHARE:
+        return None
+    progress("empirical law")
+    law = empirical_law(problem, balance)
+    best = leader.drop_train if leader and leader.accepted else 0.0
+    return law if law and law.drop_train > best + LAW_MARGIN else None
+
+
+def _verdict(ranking: tuple[Ranked, ...], law: Law | None, held_out: bool) -> Verdict:
+    """The verdict of interface.md section 4."""
+    if law:
+        return Verdict.NOT_IN_CATALOGUE
+    leader = ranking[0] if ranking else None
+    if leader and leader.accepted:
+        return Verdict.TIE if leader.tied_with or not held_out else Verdict.FOUND
+    if leader and leader.reasons == (SHARE_REASON,):
+        return Verdict.SMALL_PROXY
+    return Verdict.NOTHING_MISSING
+
+
+def _sentence(verdict: Verdict, ranking: tuple[Ranked, ...], law: Law | None) -> str:
+    """The verdict in words."""
+    leader = ranking[0] if ranking else None
+    name = leader.candidate.name if leader else ""
+    share = f"{leader.drop_train:.0%}" if leader else ""
+    if verdict is Verdict.FOUND:
+        return f"{name} is missing: it removes {share} of the misfit beyond noise"
+    if verdict is Verdict.TIE:
+        others = ", ".join(leader.tied_with) if leader and leader.tied_with else "no other"
+        return f"{name} ({share} of the misfit), not to be told here from {others}"
+    if verdict is Verdict.SMALL_PROXY:
+        return f"{name} explains {share} of the misfit and may stand for something else"
+    if verdict is Verdict.NOT_IN_CATALOGUE and law:
+        return f"nothing in the catalogue: {law.text} (empirical, not a physical effect)"
+    return "nothing in the catalogue earns its place"
+
+
+def _errors(train, validation) -> dict:
+    found = {"train": signal_errors(train)}
+    return {**found, "validation": signal_errors(validation)} if validation else found

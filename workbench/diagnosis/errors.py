@@ -1,0 +1,27 @@
+"""Errors of a fit in units: what a person reads beside the weighted ones."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from workbench.diagnosis.result import SignalError
+from workbench.fitting.gauss_newton import Fit
+from workbench.units import public_name
+
+
+def signal_errors(fit: Fit) -> dict[str, SignalError]:
+    """RMSE and fit percent of each output over all windows, by public name.
+
+    Fit percent is MATLAB's 100 (1 - |y - yhat| / |y - mean(y)|), over windows with free start.
+    """
+    windows = fit.windows
+    error = fit.residual * windows.scale[:, :, None]
+    found = {}
+    for k, name in enumerate(windows.plant.measured):
+        seen = np.isfinite(windows.measured[k])
+        values, e = windows.measured[k][seen], error[k][seen]
+        spread = float(np.linalg.norm(values - values.mean()))
+        percent = 100.0 * (1.0 - float(np.linalg.norm(e)) / spread) if spread else float("nan")
+        rmse = float(np.sqrt(np.mean(e**2)))
+        found[public_name(name)] = SignalError(rmse, percent, float(windows.noise[k]))
+    return found

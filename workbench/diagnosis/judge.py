@@ -1,0 +1,98 @@
+"""Whether to believe a refit: four criteria, ties, and the verdict in words (diagnosis.md 1.6).
+
+With tens of thousands of correlated samples everything is "significant", so significance is not
+the criterion.  A candidate is accepted when
+
+1. the effective-sample BIC falls by more than 4: scales already carry the correlation time, so
+   dBIC = dchi2 / s2 - k ln(n_eff) with s2 the misfit per effective sample of the better model,
+2. a held-out recording with frozen parameters is predicted better by more than 2 %,
+3. at least 20 % of the misfit beyond noise goes away: less may stand for something else,
+4. its size is inside its bounds and more than 3 % of typical.
+"""
+
+from __future__ import annotations
+
+from math import isnan, log
+
+import numpy as np
+
+from workbench.diagnosis.refit import Refit
+from workbench.diagnosis.scan import Profile
+from workbench.fitting.gauss_newton import Fit
+
+LEAST_BIC = 4.0
+LEAST_HELD_OUT = 0.02
+LEAST_SHARE = 0.20
+LEAST_SIZE = 0.03
+LARGEST_TIE = 3
+SAME_DIRECTION = 0.9  # cosine of two signatures that are one
+CLOSE_DROP = 0.20  # of the leader's drop: within it the order is not to be trusted
+CLOSE_DROP_SAME = 0.40  # the same for signatures that are one
+
+SHARE_REASON = f"explains less than {LEAST_SHARE:.0%} of the misfit"
+
+
+def reasons_against(base: Fit, refit: Refit) -> tuple[str, ...]:
+    """The criteria that a refit fails, in words; empty where it is accepted."""
+    against = []
+    if _bic_gain(base, refit.fit, 1 + len(refit.candidate.forms)) <= LEAST_BIC:
+        against.append("gains less than its parameters cost")
+    if not isnan(refit.drop_validation) and refit.drop_validation <= LEAST_HELD_OUT:
+        against.append("does not predict the held-out recording better")
+    if refit.drop_train < LEAST_SHARE:
+        against.append(SHARE_REASON)
+    return (*against, *_size_reasons(refit))
+
+
+def _bic_gain(base: Fit, fit: Fit, parameters: int) -> float:
+    effective = max(float(_effective_samples(base)), 2.0)
+    spread = max(fit.chi2 / effective, 1e-12)
+    return (base.chi2 - fit.chi2) / max(spread, 1.0) - parameters * log(effective)
+
+
+def _effective_samples(fit: Fit) -> float:
+    """Recorded values over the correlation times of their errors."""
+    windows = fit.windows
+    noise = windows.noise[:, None]
+    plain = windows.errors.scale(windows.activity, noise, correlated=False)
+    samples = (windows.errors.scale(windows.activity, noise) / plain) ** 2
+    recorded = (windows.weight > 0).sum(axis=2)
+    return float(np.sum(recorded / samples))
+
+
+def _size_reasons(refit: Refit) -> list[str]:
+    """Size criteria: not negligible, not at a bound."""
+    name = refit.candidate.strength
+    known = refit.fit.plant.parameters[name]
+    size = refit.size[name].value
+    null = known.null or 0.0
+    reasons = []
+    if abs(size - null) < LEAST_SIZE * abs(known.typical):
+        reasons.append("its size is negligible")
+    if abs(size - null) > 0 and size in (known.lower, known.upper) and known.upper < 1.0:
+        reasons.append("its size is at a bound")
+    return reasons
+
+
+def ties(
+    leader: Refit, others: list[Refit], profiles: dict[str, Profile]
+) -> tuple[Refit, ...]:
+    """Those that cannot be told from the leader, best first, at most two.
+
+    A candidate is tied when its drop comes within 20 % of the leader's, or within 40 % with a
+    signature in the same direction: then only the nuisances decide between the two.
+    """
+    tied = []
+    for other in others:
+        gap = (leader.drop_train - other.drop_train) / max(leader.drop_train, 1e-12)
+        cosine = abs(alignment(profiles[leader.candidate.name], profiles[other.candidate.name]))
+        if gap < CLOSE_DROP or (cosine > SAME_DIRECTION and gap < CLOSE_DROP_SAME):
+            tied.append(other)
+    return tuple(tied[: LARGEST_TIE - 1])
+
+
+def alignment(one: Profile, other: Profile) -> float:
+    """Cosine of the angle between two projected signatures, between -1 and 1."""
+    a, b = one.signature, other.signature
+    size = float(np.linalg.norm(a) * np.linalg.norm(b))
+    return float(a @ b) / size if size > 0 else 0.0

@@ -1,0 +1,106 @@
+"""The prior fit that every diagnosis starts from: windows, what may move, and how far it got."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+from workbench.diagnosis.scan import staged
+from workbench.fitting.gauss_newton import Fit, fit_windows, refit_starts
+from workbench.fitting.noise import measured_noise
+from workbench.fitting.unknowns import Unknowns, nominal_unknowns
+from workbench.fitting.windows import Windows, cut_windows
+from workbench.plant import Candidate, Plant
+from workbench.recording import Recording
+from workbench.rig import Rig
+
+FIRST_ITERATIONS = 3  # with scales from the model as it came
+ITERATIONS = 12  # with scales from the first fit
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A rig, its recordings cut into windows, and the fit of what is there.
+
+    Attributes
+    ----------
+    whole
+        The plant with all absent effects in their places, for the recordings' channels.
+    added
+        Causes that the rig file added: their strengths are free.
+    base
+        The prior fit on the training windows.
+    base_validation
+        The base plant on the held-out windows, only start states refitted; None without any.
+    """
+
+    rig: Rig
+    whole: Plant
+    added: tuple[Candidate, ...]
+    base: Fit
+    base_validation: Fit | None
+
+    def unknowns(self, plant: Plant, *more: Candidate) -> Unknowns:
+        """What a fit of a plant may move, with more causes added."""
+        added = (*self.added, *more)
+        return nominal_unknowns(plant, self.rig.deviations, self.rig.fixed, added)
+
+    def validated(self, fit: Fit) -> Fit | None:
+        """A fitted plant on the held-out windows, only start states refitted."""
+        if self.base_validation is None:
+            return None
+        windows = self.base_validation.windows
+        if fit.windows.plant is not windows.plant:
+            windows = windows.with_plant(fit.windows.plant)
+        return refit_starts(windows, fit.plant.values)
+
+    @property
+    def misfit(self) -> float:
+        """Squared error of the base beyond sensor noise."""
+        return misfit(self.base)
+
+
+def misfit(fit: Fit) -> float:
+    """Sum of squared weighted residuals beyond what sensor noise adds, at least 1."""
+    return max(fit.chi2 - fit.windows.floor, 1.0)
+
+
+def pose(rig: Rig, train: Sequence[Recording], validation: Sequence[Recording] = ()) -> Problem:
+    """Cut, fit twice (the second time with the error model of the first), and validate.
+
+    Raises
+    ------
+    ValueError
+        If the recordings hold no whole window, or an output shows no noise.
+    """
+    whole = rig.fit_for(train[0])
+    added = tuple(whole.candidates[name] for name in rig.added if name in whole.candidates)
+    plant = staged(whole, *(c.member for c in added))
+    noise = measured_noise(train, plant.measured)
+    windows = cut_windows(plant, train, noise)
+    unknowns = nominal_unknowns(plant, rig.deviations, rig.fixed, added)
+    untouched = fit_windows(windows, unknowns, iterations=0)
+    windows = windows.rescaled(untouched.residual)
+    rough = fit_windows(windows, unknowns, iterations=FIRST_ITERATIONS)
+    windows = windows.rescaled(rough.residual)
+    base = fit_windows(windows, unknowns, rough.point, iterations=ITERATIONS)
+    held_out = None
+    if validation:
+        held_out = refit_starts(_held_out(validation, base, noise), base.plant.values)
+    return Problem(rig, whole, added, base, held_out)
+
+
+def _held_out(validation: Iterable[Recording], base: Fit, noise: dict[str, float]) -> Windows:
+    """Windows of the held-out recordings on the yardstick of the training."""
+    windows = cut_windows(base.windows.plant, validation, noise).scaled_like(base.windows)
+    return windows.capped(refit_starts(windows, base.plant.values).residual)
+
+
+def split(recordings: Sequence[Recording]) -> tuple[list[Recording], list[Recording]]:
+    """The first two thirds of each recording, and its last third."""
+    cuts = [2 * len(recording) // 3 for recording in recordings]
+    early = [r.part(0, cut) for r, cut in zip(recordings, cuts, strict=True)]
+    late = [r.part(cut, len(r)) for r, cut in zip(recordings, cuts, strict=True)]
+    named = [replace(r, name=f"{r.name}, last third") for r in late]
+    return early, named
+

@@ -1,0 +1,61 @@
+"""Causes that are only a shift of a fitted parameter: scored with that parameter held.
+
+The prior fit would swallow them.  With V the posterior variance of the scaled parameter at the fit
+(prior included) and t its shift in prior deviations, the recording alone would put it at
+t / (1 - V) with variance V / (1 - V).  Held at its prior the misfit would be larger by the square
+of the one over the other: that is what the shift explains.  It is named only when it leaves its
+prior by more than three standard deviations (diagnosis.md 1.4).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from workbench.diagnosis.problem import Problem
+from workbench.diagnosis.result import Size
+from workbench.fitting.gauss_newton import linearise, normal_equations
+from workbench.plant import Candidate
+
+LEAVES_PRIOR = 3.0
+
+
+@dataclass(frozen=True)
+class Shift:
+    """How far the recording pulls one parameter, in prior standard deviations.
+
+    drop    share of the misfit with the parameter held that freeing it removes
+    """
+
+    candidate: Candidate
+    name: str
+    size: Size
+    deviations: float
+    drop: float
+
+    @property
+    def leaves(self) -> bool:
+        """True where the parameter leaves its prior."""
+        return abs(self.deviations) > LEAVES_PRIOR
+
+
+def shifts(problem: Problem) -> list[Shift]:
+    """The shift of every cause whose parameter the base fit may move."""
+    base = problem.base
+    unknowns, t = base.unknowns, base.point.t
+    normal = normal_equations(linearise(base.windows, unknowns, base.point), unknowns)
+    variance = np.clip(np.diag(np.linalg.inv(normal.hessian)), 1e-12, 1.0 - 1e-9)
+    found = []
+    for candidate in problem.whole.candidates.values():
+        name = candidate.held if candidate.held in unknowns.names else candidate.strength
+        if name not in unknowns.names or candidate in problem.added or candidate.cause.tolerated:
+            continue
+        k = unknowns.names.index(name)
+        alone = t[k] / (1.0 - variance[k])
+        gained = alone**2 * (1.0 - variance[k]) / variance[k]
+        drop = gained / (problem.misfit + gained)
+        value = float(unknowns.prior[k] + unknowns.scale[k] * alone)
+        deviation = float(unknowns.scale[k] * np.sqrt(variance[k] / (1.0 - variance[k])))
+        found.append(Shift(candidate, name, Size(value, deviation), float(alone), float(drop)))
+    return found

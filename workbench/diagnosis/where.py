@@ -1,0 +1,150 @@
+"""Where a model fails: the missing term of each balance, from an unknown-input smoother.
+
+A random walk is added to one state rate at a time, at *prior* parameters: a deterministic fit would
+spread a valve or leak error into mass and damping and move the blame (diagnosis.md 4.3).  The gain
+of log-likelihood over the filter without it, at the best of a few intensities, names the balance;
+the smoothed walk, in N or kg/s, against the variables that drive it shows what is missing.
+
+Source: diagnosis.md 1.3; Kristensen, Madsen and Jorgensen 2004 (significant diffusion terms).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from workbench.comparison.regimes import regimes, shares
+from workbench.diagnosis.problem import Problem
+from workbench.diagnosis.result import Dependence, Where
+from workbench.fitting.gauss_newton import Fit
+from workbench.filtering import FilterResult, filter_pass, smooth
+from workbench.parts import Body, Chamber
+from workbench.plant import Plant
+from workbench.recording import Recording
+
+GRID_S = 5e-3
+BINS = 15
+INTENSITIES = {"velocity_m_s": (1.0, 5.0), "pressure_pa": (1e5, 1e6)}  # of a rate, per sqrt(s)
+PROCESS = {"velocity_m_s": 0.3, "pressure_pa": 3e4, "mass_kg": 1e-6}  # what no model is without
+
+
+@dataclass(frozen=True)
+class Suspect:
+    """A balance whose rate may lack a term."""
+
+    balance: str
+    state: str
+    term_name: str
+    factor: float
+
+
+def locate(problem: Problem, recordings: Sequence[Recording]) -> Where | None:
+    """Log-likelihood gain of each balance, and the missing term of the one that gains most.
+
+    None for a plant without states, or where no filter run came through.
+    """
+    plant = problem.whole.lean()
+    suspects = _suspects(plant)
+    if not suspects:
+        return None
+    recording = recordings[0]
+    noise = dict(zip(plant.measured, problem.base.windows.noise, strict=True))
+    decimate = max(round(GRID_S / recording.sample_time_s), 1)
+    always = {s: PROCESS[k] for s in plant.state_list if (k := s.rpartition(".")[2]) in PROCESS}
+    plain = filter_pass(plant, recording, {}, noise, always, decimate).log_likelihood
+    gains = {}
+    for suspect in suspects:
+        runs = {
+            q: filter_pass(plant, recording, {suspect.state: q}, noise, always, decimate)
+            for q in INTENSITIES[suspect.state.rpartition(".")[2]]
+        }
+        best = max(runs, key=lambda q: runs[q].log_likelihood)
+        gains[suspect] = (runs[best].log_likelihood - plain, best)
+    worst = max(gains, key=lambda s: gains[s][0])
+    result = smooth(plant, recording, {worst.state: gains[worst][1]}, noise, always, decimate)
+    term = result.unknown[0] * worst.factor
+    return Where(
+        balance=worst.balance,
+        by_balance={s.balance: float(gain) for s, (gain, _) in gains.items()},
+        term_name=worst.term_name,
+        time_s=result.time_s,
+        term=term,
+        term_deviation=result.unknown_deviation[0] * abs(worst.factor),
+        against=_dependences(plant, recording, result, term, decimate),
+        by_regime=regime_shares(problem.base),
+    )
+
+
+def _suspects(plant: Plant) -> list[Suspect]:
+    """One per body and chamber; pressures stand for the mass balance of their chamber.
+
+    dp/dt = kappa R T / V mdot, so a missing mass flow is V / (kappa R T) times the missing rate.
+    """
+    found = []
+    for part in plant.parts:
+        if isinstance(part, Body):
+            mass = float(part.mass_kg)
+            state = f"{part.name}.velocity_m_s"
+            found.append(Suspect(f"{part.name}.momentum", state, "force_n", mass))
+        if isinstance(part, Chamber) and any(isinstance(p, Body) for p in plant.parts):
+            volume = float(part.dead_volume_m3) + float(part.area_m2 * part.stroke_m) / 2
+            factor = volume / (1.4 * part.gas_constant_j_kg_k * part.initial_temperature_k)
+            state = f"{part.name}.pressure_pa"
+            found.append(Suspect(f"{part.name}.mass", state, "mass_flow_kg_s", factor))
+    return found
+
+
+def regime_shares(fit: Fit) -> dict[str, float]:
+    """Share of the squared error by regime over all training windows, largest first."""
+    windows, squared = fit.windows, (fit.residual**2).sum(axis=0)
+    found: dict[str, list[np.ndarray]] = {}
+    errors, first = [], 0
+    for recording, own in zip(windows.recordings, windows.firsts, strict=True):
+        values = np.full(len(recording), np.nan)
+        for row, start in enumerate(own, start=first):
+            values[start : start + windows.length] = squared[row]
+        first += len(own)
+        errors.append(values)
+        for name, samples in regimes(fit.plant, recording).items():
+            found.setdefault(name, []).append(samples)
+    whole = {name: parts for name, parts in found.items() if len(parts) == len(errors)}
+    chosen = {name: np.concatenate(parts) for name, parts in whole.items()}
+    return shares(chosen, np.concatenate(errors))
+
+
+def _dependences(
+    plant: Plant, recording: Recording, result: FilterResult, term: np.ndarray, decimate: int
+) -> tuple[Dependence, ...]:
+    """Correlation ratio of the term with each driving variable, strongest first."""
+    n = len(term)
+    drivers = dict(zip(result.state_names, result.states, strict=True))
+    for name in plant.model.commands:
+        command = recording[name][: n * decimate : decimate]
+        drivers[name] = command
+        drivers[f"rate of {name}"] = np.gradient(command, result.time_s)
+    found = [_dependence(name, values[:n], term[: len(values)]) for name, values in drivers.items()]
+    return tuple(sorted(found, key=lambda each: -each.explains))
+
+
+def _dependence(name: str, values: np.ndarray, term: np.ndarray) -> Dependence:
+    """eta^2 = Var(E[d|s]) / Var(d) over quantile bins of s."""
+    edges = np.unique(np.quantile(values, np.linspace(0, 1, BINS + 1)))
+    if len(edges) < 3:
+        return Dependence(name, 0.0, np.zeros((3, 0)))
+    where = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, len(edges) - 2)
+    members = [where == k for k in range(len(edges) - 1)]
+    members = [inside for inside in members if inside.any()]
+    means = np.array([term[inside].mean() for inside in members])
+    counts = np.array([inside.sum() for inside in members])
+    between = float(np.sum(counts * (means - term.mean()) ** 2) / len(term))
+    variance = float(term.var())
+    bins = np.array(
+        [
+            [values[inside].mean() for inside in members],
+            means,
+            [term[inside].std() for inside in members],
+        ]
+    )
+    return Dependence(name, between / variance if variance > 0 else 0.0, bins)
