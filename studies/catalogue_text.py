@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import inspect
+from pathlib import Path
+from typing import Any
 
 from studies.text import columns, shown
 from workbench.effects import CATALOGUE
 from workbench.errors import InputError, Message, listed, nearest
+from workbench.plant import Plant
 from workbench.plants import PLANTS
 from workbench.units import public_name
 
@@ -63,6 +66,43 @@ def effects_of_plant_text(name: str) -> str:
         rows.append((*row, cause.source))
     head = ("effect", "null", "typical", "unit", "value", "balance", "kind", "source")
     return columns(head, rows)
+
+
+def candidate_name(plant: Plant, effect: str, at: str | None) -> str:
+    """The full name of an effect at its place: ``chamber_leak@chamber_a``.
+
+    Raises
+    ------
+    InputError
+        If the plant has no such effect, or several and no place is named.
+    """
+    name = f"{effect}@{at}" if at else effect
+    if name in plant.candidates:
+        return name
+    places = [full for full in plant.candidates if full.partition("@")[0] == effect]
+    if len(places) == 1 and at is None:
+        return places[0]
+    if places:
+        raise InputError(Message("needs its place", effect, f"--at, for one of {listed(places)}"))
+    known = f"one that `workbench effects {plant.name}` lists"
+    near = nearest(name, plant.candidates)
+    raise InputError(Message("there is no such effect", name, known, near))
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """The numbers of a specification.
+
+    Raises
+    ------
+    InputError
+        If the file is no TOML.
+    """
+    import tomllib
+
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(Message(f"is no TOML: {error}", file=str(path))) from error
 
 
 def studies_text() -> str:

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 from workbench.units import public_name, si_unit
 
 if TYPE_CHECKING:
+    from linearize.modes import HybridModel
+    from studies.closed_loop_check import Check
     from workbench.comparison.compare import Comparison
     from workbench.diagnosis.result import Diagnosis, Law, Ranked, SignalError, Where
 
@@ -68,6 +70,28 @@ def diagnosis_document(found: Diagnosis, unit_of: Mapping[str, str]) -> Document
         "next_recording": _next_recording(best) if best and best.tied_with else None,
         "warnings": list(found.warnings),
     }
+
+
+def modes_document(rig_name: str, hybrid: HybridModel) -> Document:
+    """The modes as plain numbers, and what is left out of them."""
+    from linearize.listing import document
+
+    left_out = [vars(item) for item in hybrid.model.left_out]
+    return {
+        "schema": "workbench.modes/1",
+        "rig": rig_name,
+        "left_out": left_out,
+        "modes": document(hybrid),
+    }
+
+
+def check_document(rig_name: str, found: Check) -> Document:
+    """A closed-loop check: one entry per run, in SI."""
+    rows = []
+    for row in found.rows:
+        values = {key: v if isinstance(v, str) else plain(v) for key, v in vars(row).items()}
+        rows.append({**values, "reached": row.reached})
+    return {"schema": "workbench.check/1", "rig": rig_name, "runs": rows}
 
 
 def errors(

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from math import isfinite
 from typing import TYPE_CHECKING
 
 from studies.text import columns, number, percent, shown
 from workbench.units import public_name
 
 if TYPE_CHECKING:
+    import numpy as np
+    from workbench.diagnosis.improve import Addition, Improvement
+    from workbench.fitting.fit import FitReport
+
     from workbench.comparison.compare import Comparison, RecordingComparison
     from workbench.diagnosis.result import Diagnosis, Ranked, SignalError
 
 SHOWN_RANKS = 12
+CORRELATED = 0.9
 
 Errors = Mapping[str, Mapping[str, "SignalError"]]
 
@@ -140,3 +146,62 @@ def before_after_text(before: Errors, after: Errors, unit_of: Mapping[str, str])
 def unit_names(outputs: tuple[str, ...]) -> dict[str, str]:
     """Full name of each output by its public name."""
     return {public_name(name): name for name in outputs} | {name: name for name in outputs}
+
+
+def addition_text(found: Addition, unit_of: Mapping[str, str]) -> str:
+    """Errors before and after on both sets, and the parameters that moved."""
+    drops = f"misfit removed: {percent(found.drop_train, 1)} of training"
+    if isfinite(found.drop_validation):
+        drops += f", {percent(found.drop_validation, 1)} of validation"
+    rows = [
+        (public_name(name), shown(old, name), shown(new, name), shown(deviation, name, 2))
+        for name, old, new, deviation, _ in found.parameters
+    ]
+    parameters = columns(("parameter", "before", "after", "deviation"), rows)
+    errors = before_after_text(found.before, found.after, unit_of)
+    return "\n".join((errors, drops, "", parameters))
+
+
+def improvement_text(found: Improvement, unit_of: Mapping[str, str]) -> str:
+    """The falling error, what was added, and errors before the first and after the last step."""
+    rows = [(label, number(train), number(held_out)) for label, train, held_out in found.budget]
+    head = ("with", "chi2 per sample, training", "validation")
+    parts = [columns(head, rows), ""]
+    parts += [f"diagnosis {k}: {d.sentence}" for k, d in enumerate(found.diagnoses, start=1)]
+    if found.steps:
+        first, last = found.steps[0], found.steps[-1]
+        parts += ["", before_after_text(first.before, last.after, unit_of)]
+    return "\n".join(parts)
+
+
+def fit_text(found: FitReport, unit_of: Mapping[str, str]) -> str:
+    """Parameters with prior and fitted values, strong correlations, and errors."""
+    rows = [
+        (
+            public_name(row.name),
+            f"{shown(row.prior, row.name)} ± {shown(row.prior_deviation, row.name, 2)}",
+            f"{shown(row.value, row.name)} ± {shown(row.deviation, row.name, 2)}",
+            ", ".join(
+                word for word, holds in (("at a bound", row.at_bound), ("flat", row.flat)) if holds
+            ),
+        )
+        for row in found.rows
+    ]
+    parts = [columns(("parameter", "prior", "fitted", ""), rows), ""]
+    parts += correlation_lines(*found.correlations)
+    parts += ["", before_after_text(found.before, found.after, unit_of)]
+    return "\n".join(parts + ([] if found.converged else ["warning: the fit did not converge"]))
+
+
+def correlation_lines(names: Sequence[str], matrix: np.ndarray) -> list[str]:
+    """Pairs of parameters that this recording can hardly tell apart, strongest first."""
+    pairs = [
+        (abs(matrix[i, k]), f"{public_name(names[i])} and {public_name(names[k])}: "
+         f"{matrix[i, k]:+.2f}")
+        for i in range(len(names))
+        for k in range(i)
+        if abs(matrix[i, k]) > CORRELATED
+    ]  # fmt: skip
+    if not pairs:
+        return [f"no correlation above {CORRELATED}"]
+    return [f"correlations above {CORRELATED}:", *(text for _, text in sorted(pairs)[::-1])]

@@ -6,6 +6,24 @@ Whatever takes time to import is imported inside the commands, so that ``--help`
 from studies.command_line import catalogue, control, missing, plant, show
 from studies.command_line.application import app
 
+ORDER = [
+    "demo",
+    "plants",
+    "effects",
+    "studies",
+    "simulate",
+    "compare",
+    "diagnose",
+    "add",
+    "improve",
+    "fit",
+    "modes",
+    "design",
+    "check",
+    "report",
+]
+app.registered_commands.sort(key=lambda command: ORDER.index(command.callback.__name__))
+
 __all__ = ["app", "catalogue", "control", "main", "missing", "plant", "show"]
 
 

@@ -1,1 +1,127 @@
-"""x."""
+"""Commands on modes and closed loops: modes, design, check."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from studies.command_line.application import (
+    NO,
+    Figures,
+    Json,
+    Output,
+    Quiet,
+    RigFile,
+    Spread,
+    answering,
+    app,
+    command_text,
+    example,
+    writable,
+    write_json,
+)
+
+DesignFile = Annotated[Path, typer.Argument(metavar="DESIGN", help="What `design` wrote.")]
+Several = Annotated[int, typer.Option("--runs", metavar="N", min=1, help="Plants to draw.")]
+CHECK = "workbench check rig.toml lq.toml --estimator mhe --scenario step --figures figures"
+
+
+@app.command(cls=Spread, epilog=example("workbench modes rig.toml --export modes"))
+def modes(
+    rig: RigFile,
+    json: Json = None,
+    export: Annotated[
+        Path | None, typer.Option("--export", metavar="DIR", help="MAT file, table and pole map.")
+    ] = None,
+    quiet: Quiet = False,
+) -> None:
+    """The hybrid state-space modes: poles, controllability, observability, error."""
+    with answering(quiet) as say:
+        from linearize.listing import left_out, table
+        from linearize.standard import standard_modes
+        from studies.documents import modes_document
+        from workbench.rig import load_rig
+
+        writable(json)
+        known = load_rig(rig)
+        say("linearising")
+        hybrid = standard_modes(known.plant)
+        write_json(json, modes_document(known.name, hybrid))
+        if export:
+            from studies.export import export_modes
+
+            export_modes(hybrid, export, command_text())
+            say(f"modes in {export}")
+        typer.echo(f"{table(hybrid)}\n\nleft out of the modes:\n{left_out(hybrid)}")
+
+
+@app.command(cls=Spread, epilog=example("workbench design rig.toml --controller lq -o lq.toml"))
+def design(
+    rig: RigFile,
+    controller: Annotated[
+        str, typer.Option("--controller", metavar="METHOD", help="pid, lq or mpc.")
+    ],
+    output: Output,
+    spec: Annotated[
+        Path | None, typer.Option("--spec", metavar="SPEC.toml", help="Numbers of the design.")
+    ] = None,
+    quiet: Quiet = False,
+) -> None:
+    """One design per mode, written as a file that `check` reads."""
+    with answering(quiet) as say:
+        from controllers.design_file import design as design_controller
+        from controllers.design_file import gains, write_design
+        from studies.catalogue_text import read_toml
+        from workbench.rig import load_rig
+
+        writable(output)
+        known = load_rig(rig)
+        numbers = read_toml(spec) if spec else {}
+        say(f"designing {controller}")
+        found = design_controller(controller, known.plant, numbers)
+        write_design(found, output)
+        for name, gain in gains(found.controller):
+            typer.echo(f"{name}: {gain}")
+        typer.echo(f"wrote {output}")
+
+
+@app.command(cls=Spread, epilog=example(CHECK))
+def check(
+    rig: RigFile,
+    design: DesignFile,
+    estimator: Annotated[
+        list[str] | None, typer.Option("--estimator", metavar="NAME", help="ekf (usual) or mhe.")
+    ] = None,
+    scenario: Annotated[
+        list[str] | None, typer.Option("--scenario", metavar="NAME", help="step, sine; both.")
+    ] = None,
+    runs: Several = 1,
+    figures: Figures = None,
+    json: Json = None,
+    quiet: Quiet = False,
+) -> None:
+    """Closed loop against the full nonlinear plant; exit code 1 where the goal is missed.
+
+    With --runs N > 1 the plant's parameters are drawn from their uncertainty, and the estimator
+    keeps the rig's own values.
+    """
+    with answering(quiet) as say:
+        from studies.checking import check_rig
+        from studies.closed_loop_check import table
+        from studies.documents import check_document
+        from workbench.rig import load_rig
+
+        writable(json)
+        known = load_rig(rig)
+        found = check_rig(known, [design], estimator or ["ekf"], scenario or (), runs, say)
+        write_json(json, check_document(known.name, found))
+        if figures:
+            from studies.checking import styled_figures
+            from studies.figures.style import save_all
+
+            save_all(styled_figures(found), figures, command_text())
+            say(f"figures in {figures}")
+        typer.echo(table(found.rows))
+        if not all(row.reached for row in found.rows):
+            typer.echo("the goal is missed: 0.2 mm at the end of a step, no limit cycle", err=True)
+            raise typer.Exit(NO)

@@ -1,1 +1,159 @@
-"""x."""
+"""Commands that find what a plant lacks and put it in: diagnose, add, improve, fit."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from studies.command_line.application import (
+    Figures,
+    Json,
+    Output,
+    Quiet,
+    RigFile,
+    Spread,
+    Train,
+    Validate,
+    answering,
+    app,
+    command_text,
+    example,
+    read_all,
+    writable,
+    write_json,
+)
+
+DIAGNOSE = "workbench diagnose rig.toml train.csv --validate validation.csv --json found.json"
+ADD = (
+    "workbench add rig.toml chamber_leak --at chamber_a --fit train.csv "
+    "--validate validation.csv -o rig2.toml"
+)
+IMPROVE = "workbench improve rig.toml train.csv --validate validation.csv -o rig2.toml"
+FIT = "workbench fit rig.toml train.csv --validate validation.csv -o rig2.toml"
+
+
+@app.command(cls=Spread, epilog=example(DIAGNOSE))
+def diagnose(
+    rig: RigFile,
+    train: Train,
+    validate: Validate = None,
+    figures: Figures = None,
+    json: Json = None,
+    quiet: Quiet = False,
+) -> None:
+    """Which physical effect is missing: ranking of the catalogue, and where the plant fails.
+
+    Without --validate the last third of each recording is held out, which is weaker evidence.
+    """
+    with answering(quiet) as say:
+        from studies.documents import diagnosis_document
+        from studies.text_of_results import diagnosis_text, unit_names
+        from workbench.diagnosis.diagnose import diagnose as find_missing
+        from workbench.rig import load_rig
+
+        writable(json)
+        known = load_rig(rig)
+        read = read_all(known, train, say)
+        held_out = read_all(known, validate, say)
+        found = find_missing(known, read, held_out, say)
+        units = unit_names(known.plant.measured + known.plant.optional_outputs)
+        write_json(json, diagnosis_document(found, units))
+        if figures:
+            from studies.figures.diagnosis import diagnosis_figures
+            from studies.figures.style import save_all
+
+            save_all(diagnosis_figures(found), figures, command_text())
+            say(f"figures in {figures}")
+        typer.echo(diagnosis_text(found, units))
+
+
+@app.command(cls=Spread, epilog=example(ADD))
+def add(
+    rig: RigFile,
+    effect: Annotated[str, typer.Argument(metavar="EFFECT", help="As `workbench effects` lists.")],
+    fit: Annotated[
+        list[Path], typer.Option("--fit", metavar="TRAIN...", help="Recordings to fit.")
+    ],
+    output: Output,
+    at: Annotated[str | None, typer.Option("--at", metavar="PART", help="Its place.")] = None,
+    validate: Validate = None,
+    quiet: Quiet = False,
+) -> None:
+    """Add one effect, refit, and print the error before and after on both sets."""
+    with answering(quiet) as say:
+        from workbench.diagnosis.improve import add as add_effect
+
+        from studies.catalogue_text import candidate_name
+        from studies.text_of_results import addition_text, unit_names
+        from workbench.rig import load_rig
+        from workbench.rig_writing import write_rig
+
+        writable(output)
+        known = load_rig(rig)
+        name = candidate_name(known.plant, effect, at)
+        read, held_out = read_all(known, fit, say), read_all(known, validate, say)
+        found = add_effect(known, name, read, held_out, say)
+        write_rig(found.rig, output)
+        typer.echo(addition_text(found, unit_names(known.plant.measured)))
+        typer.echo(f"wrote {output}")
+
+
+@app.command(cls=Spread, epilog=example(IMPROVE))
+def improve(
+    rig: RigFile,
+    train: Train,
+    validate: Validate,
+    output: Output,
+    report: Annotated[
+        Path | None, typer.Option("--report", metavar="DIR", help="Report and figures.")
+    ] = None,
+    quiet: Quiet = False,
+) -> None:
+    """Diagnose and add, again and again, until nothing in the catalogue earns its place."""
+    with answering(quiet) as say:
+        from workbench.diagnosis.improve import improve as improve_rig
+
+        from studies.text_of_results import improvement_text, unit_names
+        from workbench.rig import load_rig
+        from workbench.rig_writing import write_rig
+
+        writable(output)
+        known = load_rig(rig)
+        read, held_out = read_all(known, train, say), read_all(known, validate, say)
+        found = improve_rig(known, read, held_out, say)
+        write_rig(found.rig, output)
+        if report:
+            from studies.report.improvement import report_improvement
+
+            say(f"report in {report_improvement(found, report, command_text())}")
+        typer.echo(improvement_text(found, unit_names(known.plant.measured)))
+        typer.echo(f"wrote {output}")
+
+
+@app.command(cls=Spread, epilog=example(FIT))
+def fit(
+    rig: RigFile,
+    train: Train,
+    output: Output,
+    validate: Validate = None,
+    only: Annotated[
+        list[str] | None,
+        typer.Option("--only", metavar="NAMES", help="Parameters to fit, others stay."),
+    ] = None,
+    quiet: Quiet = False,
+) -> None:
+    """Estimate parameters with their priors; standard deviations, correlations, flat directions."""
+    with answering(quiet) as say:
+        from workbench.fitting.fit import fit as fit_rig
+
+        from studies.text_of_results import fit_text, unit_names
+        from workbench.rig import load_rig
+        from workbench.rig_writing import write_rig
+
+        writable(output)
+        known = load_rig(rig)
+        read, held_out = read_all(known, train, say), read_all(known, validate, say)
+        found = fit_rig(known, read, held_out, only=tuple(only or ()), progress=say)
+        write_rig(found.rig, output)
+        typer.echo(fit_text(found, unit_names(known.plant.measured)))
+        typer.echo(f"wrote {output}")

@@ -1,0 +1,40 @@
+"""The report of an improvement: each diagnosis, and the falling error."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from studies.figures.diagnosis import diagnosis_figures
+from studies.figures.improvement import before_after_figure, budget_figure
+from studies.figures.style import save_all
+from studies.report.page import FIGURES, Section, write_report
+from studies.text_of_results import (
+    addition_text,
+    diagnosis_text,
+    improvement_text,
+    unit_names,
+)
+
+if TYPE_CHECKING:
+    from workbench.diagnosis.improve import Improvement
+
+
+def report_improvement(found: Improvement, folder: Path, command: str) -> Path:
+    """Figures and the page of an improvement."""
+    units = unit_names(found.rig.plant.measured + found.rig.plant.optional_outputs)
+    figures = {"error_by_effect": budget_figure(found.budget)} if found.budget else {}
+    if found.steps:
+        first, last = found.steps[0], found.steps[-1]
+        figures["before_and_after"] = before_after_figure(first.before, last.after, units)
+    sections = [Section("The falling error", (), improvement_text(found, units), (*figures,))]
+    for number, diagnosis in enumerate(found.diagnoses, start=1):
+        drawn = diagnosis_figures(diagnosis, f"{number}_")
+        text = diagnosis_text(diagnosis, units)
+        sections.append(Section(f"Diagnosis {number}", (diagnosis.sentence,), text, (*drawn,)))
+        figures |= drawn
+        if number <= len(found.steps):
+            text = addition_text(found.steps[number - 1], units)
+            sections.append(Section(f"Addition {number}", (), text))
+    save_all(figures, folder / FIGURES, command)
+    return write_report(folder, f"Improvement of {found.rig.name}", command, sections)
