@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from workbench.effects import CATALOGUE
 from workbench.errors import InputError, Message, listed, nearest
 from workbench.plant import Plant
 from workbench.plants import PLANTS
+from workbench.rig import parameter_names
 from workbench.units import public_name
 
 
@@ -87,6 +89,25 @@ def candidate_name(plant: Plant, effect: str, at: str | None) -> str:
     known = f"one that `workbench effects {plant.name}` lists"
     near = nearest(name, plant.candidates)
     raise InputError(Message("there is no such effect", name, known, near))
+
+
+def full_names(plant: Plant, names: Sequence[str]) -> tuple[str, ...]:
+    """Full names of parameters by what a rig file may call them.
+
+    Raises
+    ------
+    InputError
+        With every unknown name and the nearest known one.
+    """
+    known = parameter_names(plant)
+    wrong = [
+        Message(f"{plant.name} has no such parameter", name, nearest=nearest(name, known))
+        for name in names
+        if name not in known
+    ]
+    if wrong:
+        raise InputError(*wrong)
+    return tuple(full for name in names for full in known[name])
 
 
 def read_toml(path: Path) -> dict[str, Any]:

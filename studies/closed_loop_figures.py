@@ -22,7 +22,7 @@ def draw_position(axes: Axes, records: dict[str, LoopRecord]) -> None:
     axes.plot(first.time_s, 1e3 * first[f"reference.{POSITION}"], color="0.6", label="reference")
     for style, (name, record) in zip(_styles(records), records.items(), strict=True):
         recording = record.recording
-        axes.plot(recording.time_s, 1e3 * recording[POSITION], style, label=name)
+        axes.plot(recording.time_s, 1e3 * recording[POSITION], **style, label=name)
     axes.set_ylabel("position (mm)")
     axes.legend(loc="lower right")
 
@@ -32,7 +32,7 @@ def draw_error(axes: Axes, records: dict[str, LoopRecord], largest_m: float = 1e
     for style, (name, record) in zip(_styles(records), records.items(), strict=True):
         recording = record.recording
         error = recording[POSITION] - recording[f"reference.{POSITION}"]
-        axes.plot(recording.time_s, 1e3 * error, style, label=name)
+        axes.plot(recording.time_s, 1e3 * error, **style, label=name)
     axes.set_ylim(-1e3 * largest_m, 1e3 * largest_m)
     axes.set_ylabel("error (mm)")
 
@@ -42,7 +42,7 @@ def draw_command(axes: Axes, records: dict[str, LoopRecord]) -> None:
     for style, (name, record) in zip(_styles(records), records.items(), strict=True):
         recording = record.recording
         command = next(key for key in recording.channels if key.endswith("command_v"))
-        axes.step(recording.time_s, recording[command], style, where="post", label=name)
+        axes.step(recording.time_s, recording[command], **style, where="post", label=name)
     axes.set_ylabel("command (V)")
     axes.set_xlabel("time (s)")
 
@@ -78,5 +78,14 @@ def check_figures(check: Check) -> dict[str, Figure]:
     return figures
 
 
-def _styles(records: dict[str, LoopRecord]) -> list[str]:
-    return [LINES[i % len(LINES)] for i in range(len(records))]
+def _styles(records: dict[str, LoopRecord]) -> list[dict[str, str]]:
+    """One colour per design, one kind of line per estimator: the same in every panel."""
+    pairs = [name.rpartition(", ")[::2] for name in records]
+    designs, estimators = (list(dict.fromkeys(column)) for column in zip(*pairs, strict=True))
+    return [
+        {
+            "color": f"C{designs.index(design)}",
+            "linestyle": LINES[estimators.index(estimator) % len(LINES)],
+        }
+        for design, estimator in pairs
+    ]

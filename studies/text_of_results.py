@@ -11,11 +11,11 @@ from workbench.units import public_name
 
 if TYPE_CHECKING:
     import numpy as np
-    from workbench.diagnosis.improve import Addition, Improvement
-    from workbench.fitting.fit import FitReport
 
     from workbench.comparison.compare import Comparison, RecordingComparison
+    from workbench.diagnosis.improve import Addition, Improvement
     from workbench.diagnosis.result import Diagnosis, Ranked, SignalError
+    from workbench.fitting.fit import FitReport
 
 SHOWN_RANKS = 12
 CORRELATED = 0.9
@@ -59,14 +59,15 @@ def _recording_text(each: RecordingComparison) -> str:
 def diagnosis_text(found: Diagnosis, unit_of: Mapping[str, str]) -> str:
     """Verdict, ranking, where it fails, and errors before and after.
 
-    ``unit_of`` gives the full name, with its unit, of each public output name.
+    ``unit_of`` gives the full name, with its unit, of each public output name; without it errors
+    are left out.
     """
     parts = [f"verdict: {found.verdict.value}: {found.sentence}"]
     parts += [f"warning: {warning}" for warning in found.warnings]
     parts += ["", ranking_text(found)]
     if found.where:
         parts += ["", where_text(found)]
-    if found.after:
+    if found.after and unit_of:
         parts += ["", before_after_text(found.before, found.after, unit_of)]
     return "\n".join(parts)
 
@@ -154,10 +155,14 @@ def addition_text(found: Addition, unit_of: Mapping[str, str]) -> str:
     if isfinite(found.drop_validation):
         drops += f", {percent(found.drop_validation, 1)} of validation"
     rows = [
-        (public_name(name), shown(old, name), shown(new, name), shown(deviation, name, 2))
-        for name, old, new, deviation, _ in found.parameters
+        (
+            public_name(row.name),
+            f"{shown(row.before, row.name)} ± {shown(row.prior_deviation, row.name, 2)}",
+            f"{shown(row.after, row.name)} ± {shown(row.deviation, row.name, 2)}",
+        )
+        for row in found.parameters
     ]
-    parameters = columns(("parameter", "before", "after", "deviation"), rows)
+    parameters = columns(("parameter", "before", "after"), rows)
     errors = before_after_text(found.before, found.after, unit_of)
     return "\n".join((errors, drops, "", parameters))
 
@@ -188,7 +193,7 @@ def fit_text(found: FitReport, unit_of: Mapping[str, str]) -> str:
         for row in found.rows
     ]
     parts = [columns(("parameter", "prior", "fitted", ""), rows), ""]
-    parts += correlation_lines(*found.correlations)
+    parts += correlation_lines([row.name for row in found.rows], found.correlations)
     parts += ["", before_after_text(found.before, found.after, unit_of)]
     return "\n".join(parts + ([] if found.converged else ["warning: the fit did not converge"]))
 

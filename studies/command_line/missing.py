@@ -81,10 +81,9 @@ def add(
 ) -> None:
     """Add one effect, refit, and print the error before and after on both sets."""
     with answering(quiet) as say:
-        from workbench.diagnosis.improve import add as add_effect
-
         from studies.catalogue_text import candidate_name
         from studies.text_of_results import addition_text, unit_names
+        from workbench.diagnosis.improve import add as add_effect
         from workbench.rig import load_rig
         from workbench.rig_writing import write_rig
 
@@ -111,9 +110,8 @@ def improve(
 ) -> None:
     """Diagnose and add, again and again, until nothing in the catalogue earns its place."""
     with answering(quiet) as say:
-        from workbench.diagnosis.improve import improve as improve_rig
-
         from studies.text_of_results import improvement_text, unit_names
+        from workbench.diagnosis.improve import improve as improve_rig
         from workbench.rig import load_rig
         from workbench.rig_writing import write_rig
 
@@ -144,16 +142,18 @@ def fit(
 ) -> None:
     """Estimate parameters with their priors; standard deviations, correlations, flat directions."""
     with answering(quiet) as say:
-        from workbench.fitting.fit import fit as fit_rig
-
+        from studies.catalogue_text import full_names
         from studies.text_of_results import fit_text, unit_names
+        from workbench.fitting.fit import fit as fit_rig
         from workbench.rig import load_rig
         from workbench.rig_writing import write_rig
 
         writable(output)
         known = load_rig(rig)
         read, held_out = read_all(known, train, say), read_all(known, validate, say)
-        found = fit_rig(known, read, held_out, only=tuple(only or ()), progress=say)
+        found = fit_rig(
+            known, read, held_out, only=full_names(known.plant, only or ()), progress=say
+        )
         write_rig(found.rig, output)
         typer.echo(fit_text(found, unit_names(known.plant.measured)))
         typer.echo(f"wrote {output}")

@@ -1,0 +1,165 @@
+"""The main job, end to end: a recorded drive lacks an effect, and nobody here knows which.
+
+compare, see where, diagnose, add, watch the error fall on the validation recording, linearise the
+improved plant into modes, design PID, LQ and MPC, and check each with two estimators in closed loop
+on the full nonlinear plant.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from controllers.design_file import design, write_design
+from estimators import ESTIMATORS
+from linearize.listing import left_out
+from linearize.listing import table as mode_table
+from linearize.standard import standard_modes
+from studies.checking import styled_figures
+from studies.closed_loop_check import SCENARIOS, check
+from studies.closed_loop_check import table as loop_table
+from studies.documents import check_document, diagnosis_document
+from studies.export import export_modes
+from studies.figures.comparison import comparison_figures
+from studies.figures.diagnosis import diagnosis_figures
+from studies.figures.improvement import before_after_figure
+from studies.figures.modes import pole_figure
+from studies.figures.style import save_all
+from studies.report.page import FIGURES, Section, write_report
+from studies.text_of_results import addition_text, comparison_text, diagnosis_text, unit_names
+from workbench.comparison import compare
+from workbench.diagnosis.diagnose import diagnose
+from workbench.diagnosis.improve import Addition, fitted_rig, moved_parameters
+from workbench.errors import whole_file
+from workbench.reading import read_recording
+from workbench.recording import Recording
+from workbench.rig import Rig, load_rig
+from workbench.rig_writing import write_rig
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from workbench.diagnosis.result import Diagnosis, Ranked
+
+DATA = Path(__file__).with_name("demo_data")
+METHODS = ("pid", "lq", "mpc")
+
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Story:
+    """What is told while the demo runs: on the terminal, as figures, and in the report."""
+
+    folder: Path
+    command: str
+    say: Say
+    show: Say
+    sections: list[Section] = field(default_factory=list)
+
+    def tell(self, title: str, text: str, table: str, figures: Mapping[str, Figure]) -> None:
+        """One part: printed, its figures saved, and kept for the report."""
+        self.show(f"\n== {title}\n{text}\n\n{table}")
+        save_all(figures, self.folder / FIGURES, self.command)
+        self.sections.append(Section(title, (text,), table, (*figures,)))
+
+    def keep(self, name: str, document: dict) -> None:
+        """A result as JSON."""
+        import json
+
+        with whole_file(self.folder / name) as unfinished:
+            text = json.dumps(document, indent=2, allow_nan=False)
+            unfinished.write_text(text + "\n", encoding="utf-8")
+
+
+def run_demo(folder: Path, command: str, say: Say, show: Say) -> Path:
+    """Everything from two recordings to a report; gives the report's path."""
+    story = Story(folder, command, say, show)
+    rig = load_rig(DATA / "rig.toml")
+    train = read_recording(rig, DATA / "train.csv")
+    validation = read_recording(rig, DATA / "validation.csv")
+    _compare(story, "The recordings against the plant as it is", rig, validation, "before_")
+    improved = _find_and_add(story, rig, train, validation)
+    if improved is not rig:
+        _compare(story, "The improved plant on the validation recording", improved, validation, "")
+    _linearise(story, improved)
+    _control(story, improved)
+    say("report")
+    page = write_report(folder, "From a recording to a controller", command, story.sections)
+    show(f"\nwrote {page}, {folder / FIGURES} and {folder / 'improved.toml'}")
+    return page
+
+
+def _compare(story: Story, title: str, rig: Rig, validation: Recording, prefix: str) -> None:
+    story.say("comparing")
+    found = compare(rig, [validation])
+    text = (
+        "One step ahead, over windows of 0.1 s with free start, and as a free run over the whole "
+        "recording.  Positions integrate, so a free run drifts with every small error."
+    )
+    story.tell(title, text, comparison_text(found), comparison_figures(found, prefix))
+
+
+def _find_and_add(story: Story, rig: Rig, train: Recording, validation: Recording) -> Rig:
+    """The rig with the effect that a diagnosis names; the rig as it is where it names none."""
+    units = unit_names(rig.plant.measured)
+    found = diagnose(rig, [train], [validation], story.say)
+    story.keep("diagnosis.json", diagnosis_document(found, units))
+    title = "Which effect is missing, and where it shows"
+    story.tell(title, found.sentence, diagnosis_text(found, {}), diagnosis_figures(found))
+    if found.best is None:
+        write_rig(rig, story.folder / "improved.toml")
+        return rig
+    added = _accepted(rig, found, found.best)
+    write_rig(added.rig, story.folder / "improved.toml")
+    name = found.best.candidate.name
+    text = f"{name} is added and fitted with the uncertain parameters; validation is predicted."
+    figures = {"before_and_after": before_after_figure(added.before, added.after, units)}
+    story.tell(f"Errors before and after {name}", text, addition_text(added, units), figures)
+    return added.rig
+
+
+def _accepted(rig: Rig, found: Diagnosis, best: Ranked) -> Addition:
+    """What `add` gives, from the fit that the diagnosis made already."""
+    name = best.candidate.name
+    drops = f"{best.drop_train:.0%} smaller in training, {best.drop_validation:.0%} in validation"
+    return Addition(
+        rig=fitted_rig(rig, best.fit, [name], f"{name}: error {drops}"),
+        candidate=best.candidate,
+        before=found.before,
+        after=found.after,
+        drop_train=best.drop_train,
+        drop_validation=best.drop_validation,
+        parameters=moved_parameters(best.fit),
+        fit=best.fit,
+    )
+
+
+def _linearise(story: Story, rig: Rig) -> None:
+    story.say("linearising")
+    hybrid = standard_modes(rig.plant)
+    export_modes(hybrid, story.folder / "modes", story.command)
+    text = "Valve, friction and place on the stroke are cut; each box has its own affine model."
+    table = f"{mode_table(hybrid)}\n\nleft out of the modes:\n{left_out(hybrid)}"
+    story.tell("The improved plant as modes", text, table, {"poles": pole_figure(hybrid)})
+
+
+def _control(story: Story, rig: Rig) -> None:
+    designs = {}
+    for method in METHODS:
+        story.say(f"designing {method}")
+        found = design(method, rig.plant)
+        write_design(found, story.folder / f"{method}.toml")
+        designs[method] = found.controller
+    story.say("closed loops on the full nonlinear plant")
+    found = check(rig.plant, designs, ESTIMATORS, SCENARIOS)
+    story.keep("check.json", check_document(rig.name, found))
+    best = found.best
+    text = (
+        "Every design with every estimator on the full nonlinear plant, with sensor noise, "
+        f"resolution and converter.  Best: {best.design} with {best.estimator}, which ends "
+        f"{1e3 * best.final_error_m:.2g} mm from the target."
+    )
+    story.tell("Closed loops", text, loop_table(found.rows), styled_figures(found))
