@@ -1,0 +1,259 @@
+"""The command `workbench` as a user meets it: what it prints, writes, refuses and answers."""
+
+import json
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from studies.command_line import ORDER, app
+from studies.command_line.application import answering, spread
+from workbench.effects import CATALOGUE
+from workbench.plants import PLANTS
+from workbench.reading import read_recording
+from workbench.rig import default_rig, load_rig
+
+RIG = 'name = "drive 7"\nplant = "servo_drive"\n'
+
+
+def call(*words):
+    """What a command answers."""
+    return CliRunner().invoke(app, [str(word) for word in words])
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A rig file and commands of 0.6 s."""
+    place = tmp_path_factory.mktemp("drive")
+    (place / "rig.toml").write_text(RIG)
+    command = np.full(600, 4.95)
+    command[50:200], command[400:550] = 6.0, 3.9
+    rows = [f"{1e-3 * k:.3f},{value}" for k, value in enumerate(command)]
+    (place / "commands.csv").write_text("\n".join(["time,valve.command", "s,V", *rows]) + "\n")
+    return place
+
+
+@pytest.fixture(scope="module")
+def simulated(folder):
+    """A recording that `simulate` wrote."""
+    out = folder / "simulated.csv"
+    answer = call("simulate", folder / "rig.toml", folder / "commands.csv", "-o", out)
+    assert answer.exit_code == 0, answer.output
+    return out
+
+
+def test_help_is_there_at_once_for_every_command_with_an_example():
+    begun = time.perf_counter()
+    done = subprocess.run(
+        [sys.executable, "-m", "studies.command_line", "--help"], capture_output=True, text=True
+    )
+    took_s = time.perf_counter() - begun
+
+    assert done.returncode == 0
+    assert took_s < 1.5  # 0.15 s alone on the machine
+    for name in ORDER:
+        assert f"  {name} " in done.stdout
+        answer = call(name, "--help")
+        assert answer.exit_code == 0
+        assert f"Example:\n    workbench {name}" in answer.output
+
+
+def test_plants_are_listed_one_line_each():
+    lines = call("plants").stdout.splitlines()
+
+    assert [line.split()[0] for line in lines[1:]] == list(PLANTS)
+
+
+def test_effects_lists_every_cause_of_the_catalogue():
+    words = {line.split()[0] for line in call("effects").stdout.splitlines()[1:]}
+
+    assert words == {cause.name for effect in CATALOGUE for cause in effect.causes}
+
+
+@pytest.mark.parametrize("plant", PLANTS)
+def test_effects_of_a_plant_tell_null_typical_unit_balance_and_source(plant):
+    candidates = PLANTS[plant]().candidates
+    lines = call("effects", plant).stdout.splitlines()
+
+    for column in ("null", "typical", "unit", "balance", "source"):
+        assert column in lines[0]
+    listed = {line.split()[0]: line for line in lines[1:]}
+    assert set(listed) == set(candidates)
+    for name, candidate in candidates.items():
+        assert candidate.cause.balance.value in listed[name]
+        assert candidate.cause.source in listed[name]
+
+
+def test_an_unknown_plant_gets_the_nearest_name():
+    answer = call("effects", "servo_driv")
+
+    assert answer.exit_code == 2
+    assert "did you mean 'servo_drive'?" in answer.stderr
+
+
+def test_a_simulation_is_a_recording_that_reads_back(folder, simulated):
+    recording = read_recording(load_rig(folder / "rig.toml"), simulated)
+
+    assert len(recording) == 600
+    assert set(default_rig("servo_drive").plant.measured) <= set(recording.channels)
+
+
+def test_compare_finds_no_error_in_what_the_plant_itself_made(folder, simulated):
+    out = folder / "errors.json"
+    answer = call("compare", folder / "rig.toml", simulated, "--json", out)
+
+    assert answer.exit_code == 0, answer.output
+    assert "comparing" in answer.stderr and "comparing" not in answer.stdout
+    document = json.loads(out.read_text())
+    errors = document["recordings"][0]["errors"]["free run"]["slide.position"]
+    assert document["schema"] == "workbench.comparison/1"
+    assert errors["rmse"] < 1e-6 and errors["unit"] == "m"
+    assert errors["fit_percent"] > 99.9
+
+
+def test_compare_writes_each_figure_in_four_files(folder, simulated):
+    place = folder / "figures"
+    answer = call("compare", folder / "rig.toml", simulated, "--figures", place, "-q")
+
+    assert answer.exit_code == 0, answer.output
+    assert answer.stderr == ""
+    stems = {path.stem for path in place.iterdir()}
+    assert stems == {"comparison_simulated", "regimes_simulated"}
+    for stem in stems:
+        assert {p.suffix for p in place.glob(f"{stem}.*")} == {".pdf", ".svg", ".csv", ".txt"}
+
+
+@pytest.mark.parametrize(
+    ("rig", "said"),
+    [
+        ('plant = "servo_driv"\n', "did you mean 'servo_drive'?"),
+        ('plant = "servo_drive"\n[values]\n"slide.mas" = "2 kg"\n', "slide.mass"),
+        ('plant = "servo_drive"\n[values]\n"slide.mass" = "2 kN"\n', "kg"),
+    ],
+)
+def test_a_wrong_rig_file_is_refused_and_nothing_is_written(folder, tmp_path, rig, said):
+    (tmp_path / "rig.toml").write_text(rig)
+    out = tmp_path / "out.csv"
+
+    answer = call("simulate", tmp_path / "rig.toml", folder / "commands.csv", "-o", out)
+
+    assert answer.exit_code == 2
+    assert said in answer.stderr and "Traceback" not in answer.output
+    assert list(tmp_path.iterdir()) == [tmp_path / "rig.toml"]
+
+
+def test_all_that_is_wrong_with_several_recordings_is_said_at_once(folder, tmp_path):
+    for name in ("one.csv", "two.csv"):
+        (tmp_path / name).write_text("time,valve.command\ns,V\n0,5\n0,5\n0,5\n")
+
+    answer = call("compare", folder / "rig.toml", tmp_path / "one.csv", tmp_path / "two.csv")
+
+    assert answer.exit_code == 2
+    assert "one.csv" in answer.stderr and "two.csv" in answer.stderr
+
+
+@pytest.mark.parametrize("command", ["simulate", "design", "fit", "add"])
+def test_a_folder_as_the_file_to_write_is_refused_before_any_work(folder, tmp_path, command):
+    words = {
+        "simulate": [folder / "commands.csv"],
+        "design": ["--controller", "lq"],
+        "fit": [folder / "commands.csv"],
+        "add": ["valve_lag", "--fit", folder / "commands.csv"],
+    }[command]
+
+    answer = call(command, folder / "rig.toml", *words, "-o", tmp_path)
+
+    assert answer.exit_code == 2
+    assert "is a folder" in answer.stderr
+
+
+def test_a_file_that_is_not_there_is_named(folder):
+    answer = call("compare", folder / "rig.toml", folder / "nowhere.csv")
+
+    assert answer.exit_code == 2
+    assert "nowhere.csv" in answer.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["chamber_leak"], "needs its place"),
+        (["chamber_lek", "--at", "chamber_a"], "did you mean 'chamber_leak@chamber_a'?"),
+    ],
+)
+def test_an_effect_to_add_needs_a_known_name_and_place(folder, simulated, tmp_path, words, said):
+    out = tmp_path / "rig2.toml"
+
+    answer = call("add", folder / "rig.toml", *words, "--fit", simulated, "-o", out)
+
+    assert answer.exit_code == 2
+    assert said in answer.stderr
+    assert not out.exists()
+
+
+def test_an_unknown_parameter_to_fit_gets_the_nearest_name(folder, simulated, tmp_path):
+    words = ("--only", "slide.mas", "-o", tmp_path / "rig2.toml")
+
+    answer = call("fit", folder / "rig.toml", simulated, *words)
+
+    assert answer.exit_code == 2
+    assert "did you mean 'slide.mass'?" in answer.stderr
+
+
+def test_modes_are_printed_and_exported(folder, tmp_path):
+    from scipy.io import loadmat
+
+    out = tmp_path / "modes.json"
+    place = tmp_path / "modes"
+    answer = call("modes", folder / "rig.toml", "--json", out, "--export", place, "-q")
+
+    assert answer.exit_code == 0, answer.output
+    assert "left out of the modes" in answer.stdout
+    document = json.loads(out.read_text())
+    assert len(document["modes"]) == 27
+    found = loadmat(place / "modes.mat", simplify_cells=True)["modes"]
+    assert np.array_equal(found[0]["A"], np.array(document["modes"][0]["A"]))
+
+
+def test_a_design_is_written_and_checked_and_the_answer_is_the_exit_code(folder, tmp_path):
+    rig, design, out = folder / "rig.toml", tmp_path / "lq.toml", tmp_path / "check.json"
+    assert call("design", rig, "--controller", "lq", "-o", design).exit_code == 0
+
+    answer = call("check", rig, design, "--scenario", "step", "--json", out)
+
+    (run,) = json.loads(out.read_text())["runs"]
+    assert answer.exit_code == (0 if run["reached"] else 1), answer.output
+    assert run["design"] == "lq" and run["final_error_m"] < 1e-3
+
+
+def test_an_unknown_controller_is_refused(folder, tmp_path):
+    answer = call("design", folder / "rig.toml", "--controller", "lqr", "-o", tmp_path / "x.toml")
+
+    assert answer.exit_code == 2
+    assert "no controller lqr" in answer.stderr
+    assert not list(tmp_path.iterdir())
+
+
+def test_options_take_several_values_in_a_row_behind_the_arguments():
+    several = {"--validate"}
+
+    assert spread(["rig", "a", "--validate", "b", "c", "-o", "d"], several) == [
+        "rig", "a", "--validate", "b", "--validate", "c", "-o", "d",
+    ]  # fmt: skip
+    assert spread(["--validate", "b", "rig", "a"], several) == ["--validate", "b", "rig", "a"]
+
+
+@pytest.mark.parametrize(
+    ("error", "code"),
+    [(ArithmeticError("diverged"), 3), (ValueError("no"), 2), (KeyboardInterrupt(), 130)],
+)
+def test_what_goes_wrong_becomes_an_exit_code(error, code):
+    import typer
+
+    with pytest.raises(typer.Exit) as stopped, answering(quiet=True):
+        raise error
+
+    assert stopped.value.exit_code == code

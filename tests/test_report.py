@@ -1,0 +1,279 @@
+"""Results as text, JSON, figures and one page that needs no network."""
+
+import json
+import math
+import re
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from studies.documents import diagnosis_document
+from studies.figures.diagnosis import diagnosis_figures
+from studies.figures.improvement import before_after_figure, budget_figure
+from studies.figures.modes import pole_figure
+from studies.figures.style import new_figure, save, styled
+from studies.report import Section, render_folder, write_report
+from studies.text import columns, shown
+from studies.text_of_results import correlation_lines, diagnosis_text, unit_names
+from workbench.diagnosis.result import (
+    DecidedBy,
+    Dependence,
+    Diagnosis,
+    Law,
+    Ranked,
+    SignalError,
+    Size,
+    Verdict,
+    Where,
+)
+from workbench.effect import Kind
+from workbench.errors import InputError
+from workbench.plants import PLANTS
+
+PLANT = PLANTS["servo_drive"]()
+UNITS = unit_names(PLANT.measured)
+LEAK, LAG = (PLANT.candidates[name] for name in ("chamber_leak@chamber_a", "valve_lag"))
+
+
+def ranked(candidate, drop, accepted=False, tied=(), decided_by=DecidedBy.REFIT):
+    size = {candidate.strength: Size(5.1e-8, 2e-9)} if decided_by is DecidedBy.REFIT else {}
+    return Ranked(
+        candidate=candidate,
+        kind=Kind.EFFECT,
+        size=size,
+        drop_train=drop,
+        drop_validation=drop - 0.02 if decided_by is DecidedBy.REFIT else math.nan,
+        tied_with=tied,
+        compensable=0.12,
+        decided_by=decided_by,
+        accepted=accepted,
+        reasons=() if accepted else ("explains too little",),
+    )
+
+
+def diagnosis(verdict=Verdict.FOUND, tied=(), law=None):
+    """A diagnosis as it could be, without any of the work."""
+    time_s = 5e-3 * np.arange(400)
+    bins = np.array([[4e5, 5e5, 6e5], [-1e-4, -2e-4, -3e-4], [1e-5, 1e-5, 2e-5]])
+    where = Where(
+        balance="chamber_a.mass",
+        by_balance={"chamber_a.mass": 812.0, "slide.momentum": -9.0},
+        term_name="mass_flow_kg_s",
+        time_s=time_s,
+        term=-2e-4 + 1e-5 * np.sin(time_s),
+        term_deviation=np.full(400, 2e-5),
+        against=(
+            Dependence("chamber_a.pressure_pa", 0.81, bins),
+            Dependence("rate of valve.command_v", 0.2, bins),
+        ),
+        by_regime={"valve closed": 0.74, "at rest": 0.5},
+    )
+    before = {"train": {"chamber_a.pressure": SignalError(8123.0, 71.0, 400.0)}, "validation": {}}
+    after = {"train": {"chamber_a.pressure": SignalError(900.0, math.nan, 400.0)}}
+    rows = (ranked(LEAK, 0.93, True, tied), ranked(LAG, 0.1, decided_by=DecidedBy.SCAN))
+    return Diagnosis(
+        rig_name="drive 7",
+        verdict=verdict,
+        sentence="a leak",
+        ranking=rows,
+        where=where,
+        before=before,
+        after=after,
+        law=law,
+        warnings=(),
+        base=None,
+        base_validation=None,
+    )
+
+
+def test_a_diagnosis_has_the_keys_of_the_contract():
+    document = diagnosis_document(diagnosis(), UNITS)
+
+    assert document["schema"] == "workbench.diagnosis/1"
+    assert (document["verdict"], document["effect"], document["at"]) == (
+        "found", "chamber_leak", "chamber_a",
+    )  # fmt: skip
+    first = document["ranking"][0]
+    assert first["size"] == {"area": {"value": 5.1e-8, "unit": "m^2", "std": 2e-9}}
+    assert first["error_drop_train"] == 0.93
+    assert first["error_drop_validation"] == pytest.approx(0.91)
+    assert (first["tied_with"], first["compensable"]) == ([], 0.12)
+    assert (first["decided_by"], first["kind"]) == ("refit", "effect")
+    where = document["where"]
+    assert where["balance"] == "chamber_a.mass"
+    assert where["by_balance"]["chamber_a.mass"] == 812.0
+    assert where["against"][0] == {"variable": "chamber_a.pressure", "explains": 0.81}
+    assert where["by_regime"][0] == {"regime": "valve closed", "share_of_error": 0.74}
+    error = document["before"]["train"]["chamber_a.pressure"]
+    assert (error["rmse"], error["unit"], error["fit_percent"]) == (8123.0, "Pa", 71.0)
+    assert document["after"]["validation"] == {}
+
+
+def test_what_is_no_number_is_null_in_json():
+    document = diagnosis_document(diagnosis(), UNITS)
+
+    assert document["ranking"][1]["error_drop_validation"] is None
+    json.dumps(document, allow_nan=False)
+
+
+def test_a_tie_asks_for_the_recording_that_shows_its_best():
+    found = diagnosis(Verdict.TIE, tied=("spool_leak",))
+
+    following = diagnosis_document(found, UNITS)["next_recording"]
+
+    assert following["what"] == LEAK.cause.shown_by
+    assert following["separates"] == ["chamber_leak@chamber_a", "spool_leak"]
+
+
+def test_nothing_missing_names_no_effect():
+    document = diagnosis_document(diagnosis(Verdict.NOTHING_MISSING), UNITS)
+
+    assert document["effect"] is None and document["at"] is None
+
+
+def test_an_empirical_law_comes_with_its_range():
+    law = Law("slide.momentum", {"v|v|": -240.0}, {"velocity": (-0.5, 0.5)}, 0.8, 0.7, "-240 v|v|")
+
+    document = diagnosis_document(diagnosis(Verdict.NOT_IN_CATALOGUE, law=law), UNITS)
+
+    assert document["law"]["terms"] == {"v|v|": -240.0}
+    assert document["law"]["ranges"] == {"velocity": [-0.5, 0.5]}
+
+
+def test_a_diagnosis_reads_in_the_units_of_people():
+    said = diagnosis_text(diagnosis(), UNITS)
+
+    assert "0.051 mm^2 ± 0.002 mm^2" in said
+    assert "0.08123 bar" in said and "0.009 bar" in said
+    assert "valve closed 74 %" in said
+
+
+def test_columns_of_numbers_are_flush_right():
+    said = columns(("name", "value"), [("a", "1.5"), ("long", "-20")])
+
+    assert said.splitlines() == ["name  value", "a       1.5", "long    -20"]
+    assert shown(math.nan, "x_pa") == "-"
+
+
+def test_only_strong_correlations_are_named():
+    matrix = np.array([[1.0, -0.95, 0.1], [-0.95, 1.0, 0.2], [0.1, 0.2, 1.0]])
+
+    lines = correlation_lines(["slide.mass_kg", "valve.flow_area_m2", "x.y_n"], matrix)
+
+    assert lines[1:] == ["valve.flow_area and slide.mass: -0.95"]
+
+
+@pytest.fixture(scope="module")
+def figures():
+    """Every kind of figure that needs no simulation."""
+    from linearize.standard import standard_modes
+
+    found = diagnosis(tied=("spool_leak",))
+    return {
+        **diagnosis_figures(found),
+        "budget": budget_figure([("as it came", 9.0, 11.0), ("+ leak", 2.0, math.nan)]),
+        "errors": before_after_figure(found.before, found.after, UNITS),
+        "poles": pole_figure(standard_modes(PLANT)),
+    }
+
+
+def test_every_panel_has_named_axes_with_units(figures):
+    for name, figure in figures.items():
+        for axes in figure.axes:
+            sharing = axes.get_shared_y_axes().get_siblings(axes)
+            words = {axes.get_xlabel(), *(each.get_ylabel() for each in sharing)} - {""}
+
+            assert words, name
+            assert all(re.search(r"\(.+\)$", word) for word in words), f"{name}: {words}"
+            assert len(words) == 2 or _named_ticks(axes), f"{name}: {words}"
+
+
+def _named_ticks(axes):
+    """True where an axis has names instead of numbers."""
+    ticks = (*axes.get_xticklabels(), *axes.get_yticklabels())
+    return any(re.search("[a-z]{3}", tick.get_text()) for tick in ticks)
+
+
+def test_a_figure_is_saved_as_pdf_svg_csv_and_its_command(figures, tmp_path):
+    for name, figure in figures.items():
+        svg = save(figure, tmp_path / name, "workbench demo")
+
+        ElementTree.parse(svg)
+        assert (tmp_path / f"{name}.pdf").read_bytes().startswith(b"%PDF")
+        assert (tmp_path / f"{name}.txt").read_text() == "workbench demo\n"
+        rows = (tmp_path / f"{name}.csv").read_text().splitlines()
+        assert rows[0] == "panel,curve,x,y" and len(rows) > 2
+
+
+def test_the_table_beside_a_figure_holds_what_is_drawn(figures, tmp_path):
+    save(figures["ranking"], tmp_path / "ranking", "x")
+
+    rows = (tmp_path / "ranking.csv").read_text()
+
+    assert ",training,= chamber_leak@chamber_a,93" in rows
+    assert ",validation,= chamber_leak@chamber_a,91" in rows
+
+
+def test_two_runs_give_the_same_bytes(tmp_path):
+    def drawn(stem):
+        with styled():
+            figure = new_figure(3.5, 2.0)
+            figure.subplots().plot([0, 1], [0, 1], label="line")
+        save(figure, tmp_path / stem, "x")
+        return [(tmp_path / f"{stem}.{e}").read_bytes() for e in ("pdf", "svg", "csv")]
+
+    assert drawn("one") == drawn("two")
+
+
+@pytest.fixture
+def page(figures, tmp_path):
+    for name in ("poles", "budget"):
+        save(figures[name], tmp_path / "figures" / name, "workbench demo")
+    sections = [
+        Section("Modes <&>", ("Some text.",), "a  b\n1  2", ("poles",)),
+        Section("Error", figures=("budget",)),
+    ]
+    return write_report(tmp_path, "From a recording", "workbench demo", sections)
+
+
+def test_a_page_holds_its_figures_and_needs_no_network(page):
+    text = page.read_text()
+
+    assert text.count("<svg") == 2
+    assert "Modes &lt;&amp;&gt;" in text and "1  2" in text
+    assert not re.search(r'(src|href)="(?!#)', text)
+    assert not re.search(r"@import|url\((?!#)", text)
+
+
+def test_names_inside_a_page_are_its_own(page):
+    names = re.findall(r'\bid="([^"]+)"', page.read_text())
+    used = re.findall(r'href="#([^"]+)"|url\(#([^)]+)\)', page.read_text())
+
+    assert len(names) == len(set(names))
+    assert {a or b for a, b in used} <= set(names)
+
+
+def test_a_page_can_be_made_again_from_its_folder(page):
+    before = page.read_bytes()
+    page.unlink()
+
+    assert render_folder(page.parent).read_bytes() == before
+
+
+def test_a_folder_of_figures_alone_makes_a_page_too(figures, tmp_path):
+    save(figures["budget"], tmp_path / "budget", "workbench improve")
+
+    assert "<h2>1. budget</h2>" in render_folder(tmp_path).read_text()
+
+
+def test_an_empty_folder_is_refused(tmp_path):
+    with pytest.raises(InputError, match="nothing to report"):
+        render_folder(tmp_path)
+
+
+def test_a_report_of_others_is_refused(tmp_path):
+    (tmp_path / "report.json").write_text('{"a": 1}')
+
+    with pytest.raises(InputError, match="no report of ours"):
+        render_folder(tmp_path)
