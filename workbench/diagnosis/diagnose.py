@@ -11,10 +11,16 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from workbench.diagnosis.errors import signal_errors
-from workbench.diagnosis.judge import SHARE_REASON, reasons_against, ties
+from workbench.diagnosis.judge import (
+    HELD_OUT_REASON,
+    SHARE_REASON,
+    predicts,
+    reasons_against,
+    tie_group,
+)
 from workbench.diagnosis.law import empirical_law
 from workbench.diagnosis.problem import Problem, pose, split
-from workbench.diagnosis.refit import Refit, refit
+from workbench.diagnosis.refit import Refit, refit, refit_shift
 from workbench.diagnosis.result import DecidedBy, Diagnosis, Law, Ranked, Verdict
 from workbench.diagnosis.scan import Profile, scan
 from workbench.diagnosis.shifts import LEAVES_PRIOR, Shift, shifts
@@ -25,6 +31,7 @@ from workbench.rig import Rig
 
 REFITTED = 5  # candidates that are followed beyond the scan at the most
 ALWAYS_REFITTED = 3
+SHIFTS_REFITTED = 2  # parameters that leave their priors
 WORTH_A_REFIT = 0.25  # of the best drop of the scan
 CERTAIN_SHARE = 0.5  # an accepted candidate above it needs no comparison with an empirical law
 LAW_MARGIN = 0.15  # by how much of the misfit a law must beat the catalogue
@@ -68,8 +75,12 @@ def diagnose(
         if rank < ALWAYS_REFITTED or profile.drop > WORTH_A_REFIT * profiles[0].drop:
             progress(f"refit with {profile.candidate.name}")
             refits.append(refit(problem, profile))
-    refits.sort(key=lambda each: -each.drop_train)
-    ranking = _ranking(problem, profiles, refits, shifts(problem))
+    moved = shifts(problem)
+    for shift in [each for each in moved if each.leaves][:SHIFTS_REFITTED]:
+        progress(f"refit with {shift.name} free")
+        refits.append(refit_shift(problem, shift))
+    refits.sort(key=lambda each: (not predicts(each), -each.drop_train))
+    ranking = _ranking(problem, profiles, refits, moved)
     progress("where it fails")
     where = locate(problem, train)
     law = _law(problem, ranking, where.balance if where else None, progress)
@@ -108,32 +119,40 @@ def _scanned(problem: Problem) -> list[Profile]:
 def _ranking(
     problem: Problem, profiles: list[Profile], refits: list[Refit], moved: list[Shift]
 ) -> tuple[Ranked, ...]:
-    """All candidates, best first: refits, shifts of parameters, then the rest by the scan."""
+    """All candidates, best first: refits and shifts of parameters, those that the held-out
+    recording refuses, then the rest by the scan.
+    """
     by_name = {profile.candidate.name: profile for profile in profiles}
-    tied: dict[str, tuple[str, ...]] = {}
-    if refits:
-        group = (refits[0], *ties(refits[0], refits[1:], by_name))
-        names = [each.candidate.name for each in group]
-        tied = {name: tuple(n for n in names if n != name) for name in names}
-    rows = [_refitted(problem, r, by_name, tied.get(r.candidate.name, ())) for r in refits]
-    rows += [_shifted(shift) for shift in moved]
-    followed = {r.candidate.name for r in refits}
-    rows += [_scanned_row(problem, p) for p in profiles if p.candidate.name not in followed]
-    return tuple(sorted(rows, key=lambda row: -row.drop_train))
+    group = tie_group(refits, by_name) if refits else []
+    names = [each.candidate.name for each in group]
+    tied = {name: tuple(n for n in names if n != name) for name in names}
+    rows = {r.candidate.name: _refitted(problem, r, by_name, tied) for r in refits}
+    order = [*names, *(name for name in rows if name not in names)]
+    followed = [rows[name] for name in order if predicts_row(rows[name])]
+    refused = [rows[name] for name in order if not predicts_row(rows[name])]
+    rest = [_shifted(shift) for shift in moved if shift.candidate.name not in rows]
+    rest += [_scanned_row(problem, p) for p in profiles if p.candidate.name not in rows]
+    return (*followed, *refused, *sorted(rest, key=lambda row: -row.drop_train))
+
+
+def predicts_row(row: Ranked) -> bool:
+    """False where the held-out recording refuses a refit."""
+    return HELD_OUT_REASON not in row.reasons
 
 
 def _refitted(
-    problem: Problem, each: Refit, profiles: dict[str, Profile], tied: tuple[str, ...]
+    problem: Problem, each: Refit, profiles: dict[str, Profile], tied: dict[str, tuple[str, ...]]
 ) -> Ranked:
     against = reasons_against(problem.base, each)
+    profile = profiles.get(each.candidate.name)
     return Ranked(
         candidate=each.candidate,
-        kind=Kind.EFFECT,
+        kind=Kind.EFFECT if profile else Kind.PARAMETER,
         size=each.size,
         drop_train=each.drop_train,
         drop_validation=each.drop_validation,
-        tied_with=tied,
-        compensable=profiles[each.candidate.name].compensation,
+        tied_with=tied.get(each.candidate.name, ()),
+        compensable=profile.compensation if profile else 1.0,
         decided_by=DecidedBy.REFIT,
         accepted=not against,
         reasons=against,
@@ -142,7 +161,7 @@ def _refitted(
 
 
 def _shifted(shift: Shift) -> Ranked:
-    """A shift counts in the ranking only where it leaves its prior."""
+    """A shift that was not refitted counts by what freeing it would bring."""
     stays = (f"{shift.name} stays within {LEAVES_PRIOR:g} deviations of its prior",)
     return Ranked(
         candidate=shift.candidate,

@@ -6,7 +6,8 @@ the criterion.  A candidate is accepted when
 1. the effective-sample BIC falls by more than 4: scales already carry the correlation time, so
    dBIC = dchi2 / s2 - k ln(n_eff) with s2 the misfit per effective sample of the better model,
 2. a held-out recording with frozen parameters is predicted better by more than 2 %,
-3. at least 20 % of the misfit beyond noise goes away: less may stand for something else,
+3. at least 20 % of the misfit beyond noise goes away, as the mean over training and held-out
+   recordings and with no less than 10 % in training: less may stand for something else,
 4. its size is inside its bounds and more than 3 % of typical.
 """
 
@@ -27,8 +28,9 @@ LEAST_SIZE = 0.03
 LARGEST_TIE = 3
 SAME_DIRECTION = 0.9  # cosine of two signatures that are one
 CLOSE_DROP = 0.20  # of the leader's drop: within it the order is not to be trusted
-CLOSE_DROP_SAME = 0.40  # the same for signatures that are one
+CLOSE_DROP_SAME = 0.50  # the same for signatures that are one
 
+HELD_OUT_REASON = "does not predict the held-out recording better"
 SHARE_REASON = f"explains less than {LEAST_SHARE:.0%} of the misfit"
 
 
@@ -37,17 +39,29 @@ def reasons_against(base: Fit, refit: Refit) -> tuple[str, ...]:
     against = []
     if _bic_gain(base, refit.fit, 1 + len(refit.candidate.forms)) <= LEAST_BIC:
         against.append("gains less than its parameters cost")
-    if not isnan(refit.drop_validation) and refit.drop_validation <= LEAST_HELD_OUT:
-        against.append("does not predict the held-out recording better")
-    if refit.drop_train < LEAST_SHARE:
+    if not predicts(refit):
+        against.append(HELD_OUT_REASON)
+    if _share(refit) < LEAST_SHARE or refit.drop_train < LEAST_SHARE / 2:
         against.append(SHARE_REASON)
     return (*against, *_size_reasons(refit))
+
+
+def predicts(refit: Refit) -> bool:
+    """True where the held-out recording is predicted better, or there is none."""
+    return isnan(refit.drop_validation) or refit.drop_validation > LEAST_HELD_OUT
+
+
+def _share(refit: Refit) -> float:
+    """Share of the misfit that goes away, mean of training and held-out."""
+    if isnan(refit.drop_validation):
+        return refit.drop_train
+    return (refit.drop_train + refit.drop_validation) / 2
 
 
 def _bic_gain(base: Fit, fit: Fit, parameters: int) -> float:
     effective = max(float(_effective_samples(base)), 2.0)
     spread = max(fit.chi2 / effective, 1e-12)
-    return (base.chi2 - fit.chi2) / max(spread, 1.0) - parameters * log(effective)
+    return (base.chi2 - fit.chi2) / spread - parameters * log(effective)
 
 
 def _effective_samples(fit: Fit) -> float:
@@ -63,6 +77,8 @@ def _effective_samples(fit: Fit) -> float:
 def _size_reasons(refit: Refit) -> list[str]:
     """Size criteria: not negligible, not at a bound."""
     name = refit.candidate.strength
+    if name not in refit.size:
+        return []
     known = refit.fit.plant.parameters[name]
     size = refit.size[name].value
     null = known.null or 0.0
@@ -74,21 +90,39 @@ def _size_reasons(refit: Refit) -> list[str]:
     return reasons
 
 
-def ties(
-    leader: Refit, others: list[Refit], profiles: dict[str, Profile]
-) -> tuple[Refit, ...]:
-    """Those that cannot be told from the leader, best first, at most two.
+def tie_group(refits: list[Refit], profiles: dict[str, Profile]) -> list[Refit]:
+    """The leader and those that cannot be told from it, the leader first, at most three.
 
-    A candidate is tied when its drop comes within 20 % of the leader's, or within 40 % with a
-    signature in the same direction: then only the nuisances decide between the two.
+    A candidate is tied when its drop comes within 20 % of the best, or within 50 % with a signature
+    in the same direction: then only the nuisances decide between the two.  Among the tied the
+    held-out recording decides where it does so clearly: the one that leaves at least 20 % less of
+    the misfit there leads.
     """
-    tied = []
-    for other in others:
-        gap = (leader.drop_train - other.drop_train) / max(leader.drop_train, 1e-12)
-        cosine = abs(alignment(profiles[leader.candidate.name], profiles[other.candidate.name]))
+    best = refits[0]
+    tied = [best]
+    for other in refits[1:]:
+        if predicts(best) and not predicts(other):
+            continue
+        gap = (best.drop_train - other.drop_train) / max(best.drop_train, 1e-12)
+        cosine = abs(_alignment_of(best, other, profiles))
         if gap < CLOSE_DROP or (cosine > SAME_DIRECTION and gap < CLOSE_DROP_SAME):
             tied.append(other)
-    return tuple(tied[: LARGEST_TIE - 1])
+    tied = tied[:LARGEST_TIE]
+    leader = min(tied, key=_left_held_out)
+    if not _left_held_out(leader) < (1.0 - CLOSE_DROP) * _left_held_out(best):
+        leader = best
+    return [leader, *(each for each in tied if each is not leader)]
+
+
+def _left_held_out(each: Refit) -> float:
+    """Share of the held-out misfit that is left, at least one percent."""
+    return 1.0 if isnan(each.drop_validation) else max(1.0 - each.drop_validation, 0.01)
+
+
+def _alignment_of(one: Refit, other: Refit, profiles: dict[str, Profile]) -> float:
+    """Cosine between two refitted candidates; 0 where one has no profile (a shift)."""
+    a, b = profiles.get(one.candidate.name), profiles.get(other.candidate.name)
+    return alignment(a, b) if a and b else 0.0
 
 
 def alignment(one: Profile, other: Profile) -> float:

@@ -58,9 +58,7 @@ def _with_terms(problem: Problem) -> Problem:
         EmpiricalForce(name=f"law@{body.name}", body=body.name, middle_m=_middle(problem, body))
         for body in bodies
     ]
-    terms += [
-        EmpiricalFlow(name=f"law@{c.name}", chamber=c.name, body=c.body) for c in chambers
-    ]
+    terms += [EmpiricalFlow(name=f"law@{c.name}", chamber=c.name, body=c.body) for c in chambers]
 
     def more(plant: Plant) -> Plant:
         return plant.with_effects(*terms)

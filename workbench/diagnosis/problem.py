@@ -9,11 +9,12 @@ from workbench.diagnosis.scan import staged
 from workbench.fitting.gauss_newton import Fit, fit_windows, refit_starts
 from workbench.fitting.noise import measured_noise
 from workbench.fitting.unknowns import Unknowns, nominal_unknowns
-from workbench.fitting.windows import Windows, cut_windows
+from workbench.fitting.windows import WINDOW_S, Windows, cut_windows
 from workbench.plant import Candidate, Plant
 from workbench.recording import Recording
 from workbench.rig import Rig
 
+LONGEST_WINDOW_S = 0.4
 FIRST_ITERATIONS = 3  # with scales from the model as it came
 ITERATIONS = 12  # with scales from the first fit
 
@@ -77,7 +78,7 @@ def pose(rig: Rig, train: Sequence[Recording], validation: Sequence[Recording] =
     added = tuple(whole.candidates[name] for name in rig.added if name in whole.candidates)
     plant = staged(whole, *(c.member for c in added))
     noise = measured_noise(train, plant.measured)
-    windows = cut_windows(plant, train, noise)
+    windows = cut_windows(plant, train, noise, window_length_s(plant, train))
     unknowns = nominal_unknowns(plant, rig.deviations, rig.fixed, added)
     untouched = fit_windows(windows, unknowns, iterations=0)
     windows = windows.rescaled(untouched.residual)
@@ -90,9 +91,23 @@ def pose(rig: Rig, train: Sequence[Recording], validation: Sequence[Recording] =
     return Problem(rig, whole, added, base, held_out)
 
 
+def window_length_s(plant: Plant, recordings: Sequence[Recording]) -> float:
+    """Windows are short where pressures are recorded too, else as long as the shortest piece.
+
+    A position alone says little of flows and forces in a fifth of a second.
+    """
+    alone = all(name.endswith(("position_m", "angle_rad")) for name in plant.measured)
+    if not (alone and plant.state_list):
+        return WINDOW_S
+    shortest = min(len(piece) for r in recordings for piece in r.pieces)
+    return min(shortest * recordings[0].sample_time_s, LONGEST_WINDOW_S)
+
+
 def _held_out(validation: Iterable[Recording], base: Fit, noise: dict[str, float]) -> Windows:
     """Windows of the held-out recordings on the yardstick of the training."""
-    windows = cut_windows(base.windows.plant, validation, noise).scaled_like(base.windows)
+    length_s = base.windows.length * base.windows.recordings[0].sample_time_s
+    windows = cut_windows(base.windows.plant, validation, noise, length_s)
+    windows = windows.scaled_like(base.windows)
     return windows.capped(refit_starts(windows, base.plant.values).residual)
 
 
@@ -103,4 +118,3 @@ def split(recordings: Sequence[Recording]) -> tuple[list[Recording], list[Record
     late = [r.part(cut, len(r)) for r, cut in zip(recordings, cuts, strict=True)]
     named = [replace(r, name=f"{r.name}, last third") for r in late]
     return early, named
-

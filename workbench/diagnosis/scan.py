@@ -115,11 +115,15 @@ class Metric:
     @property
     def _columns(self) -> np.ndarray:
         J = self.normal.derivatives
-        return J.reshape(-1, J.shape[2])
+        return J.reshape(J.shape[0] * J.shape[1], J.shape[2])
 
     def _value(self, row: np.ndarray, gradient: np.ndarray) -> float:
         prior = float(np.sum(self.normal.precision * self.at.point.t**2))
-        gained = float(gradient @ np.linalg.solve(self.normal.hessian, gradient)) if len(gradient) else 0.0
+        gained = (
+            float(gradient @ np.linalg.solve(self.normal.hessian, gradient))
+            if len(gradient)
+            else 0.0
+        )
         return float(row.ravel() @ row.ravel()) + prior - gained
 
 

@@ -2,9 +2,9 @@
 
 The prior fit would swallow them.  With V the posterior variance of the scaled parameter at the fit
 (prior included) and t its shift in prior deviations, the recording alone would put it at
-t / (1 - V) with variance V / (1 - V).  Held at its prior the misfit would be larger by the square
-of the one over the other: that is what the shift explains.  It is named only when it leaves its
-prior by more than three standard deviations (diagnosis.md 1.4).
+t / (1 - V), and freeing it would lower the cost by t^2 V / (1 - V).  It is named only when it
+leaves its prior by more than three standard deviations (diagnosis.md 1.4), and judged by a refit in
+which its prior is taken away.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ LEAVES_PRIOR = 3.0
 class Shift:
     """How far the recording pulls one parameter, in prior standard deviations.
 
-    drop    share of the misfit with the parameter held that freeing it removes
+    drop    share of the misfit that freeing it removes, to first order
     """
 
     candidate: Candidate
@@ -53,9 +53,9 @@ def shifts(problem: Problem) -> list[Shift]:
             continue
         k = unknowns.names.index(name)
         alone = t[k] / (1.0 - variance[k])
-        gained = alone**2 * (1.0 - variance[k]) / variance[k]
-        drop = gained / (problem.misfit + gained)
+        gained = t[k] ** 2 * variance[k] / (1.0 - variance[k])
+        drop = gained / problem.misfit
         value = float(unknowns.prior[k] + unknowns.scale[k] * alone)
         deviation = float(unknowns.scale[k] * np.sqrt(variance[k] / (1.0 - variance[k])))
         found.append(Shift(candidate, name, Size(value, deviation), float(alone), float(drop)))
-    return found
+    return sorted(found, key=lambda shift: -shift.drop)

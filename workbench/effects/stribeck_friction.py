@@ -100,7 +100,7 @@ class StribeckFriction(Effect):
     coulomb_force_n: Expression = strength(typical=60.0, upper=1e3)
     stiction_excess_n: Expression = strength(typical=60.0, upper=1e3)
     viscous_n_s_m: Expression = strength(typical=60.0, upper=1e4)
-    asymmetry: Expression = strength(typical=0.3, lower=-0.9, upper=0.9, deviation=0.01)
+    asymmetry: Expression = strength(typical=0.3, lower=-0.9, upper=0.9)
     position_share: Expression = strength(typical=0.3, lower=-0.9, upper=0.9, deviation=0.05)
     pressure_factor_n_pa: Expression = strength(typical=2e-5, upper=1e-2)
 

@@ -24,7 +24,7 @@ from workbench.plant import Plant
 
 PARAMETER_STEP = 0.25  # of the scale of an unknown
 START_STEP = 0.25  # of the deviation of a start state
-DAMPINGS = (0.0, 0.1, 1.0, 10.0)
+DAMPINGS = (0.0, 0.1, 1.0, 10.0, 100.0)
 AGAIN = 0.05  # relative fall of the cost above which derivatives are used once more
 CONVERGED = 2e-3  # relative fall of the cost below which a fit has converged
 
@@ -137,9 +137,7 @@ def fit_windows(
     return Fit(windows, unknowns, point, float(chi2), float(cost), converged)
 
 
-def _trials(
-    windows: Windows, unknowns: Unknowns, at: Linearised, point: Point
-) -> list[Point]:
+def _trials(windows: Windows, unknowns: Unknowns, at: Linearised, point: Point) -> list[Point]:
     """Damped steps from a point, within bounds."""
     return [
         Point(unknowns.clipped(point.t + dt), point.starts + dx * windows.start_deviation)
@@ -161,7 +159,7 @@ def best_start(windows: Windows, unknowns: Unknowns, points: list[Point]) -> Poi
 
 
 def refit_starts(
-    windows: Windows, values: Mapping[str, float] | None = None, iterations: int = 4
+    windows: Windows, values: Mapping[str, float] | None = None, iterations: int = 8
 ) -> Fit:
     """Only the start states move: how well a plant with given values predicts a recording."""
     nothing = Unknowns((), *(np.zeros(0) for _ in range(5)), held=values or {})
@@ -194,7 +192,9 @@ def linearise(windows: Windows, unknowns: Unknowns, point: Point) -> Linearised:
     )
     J_p = (r[1 + n_x :] - r[0]).transpose(1, 2, 0) / h_p
     J_p = np.concatenate([J_p, np.zeros((n, n_x, n_p))], axis=1)
-    basis, triangle = np.linalg.qr(J_x) if n_x else (np.zeros((*residual.shape, 0)), np.zeros((n, 0, 0)))
+    basis, triangle = (
+        np.linalg.qr(J_x) if n_x else (np.zeros((*residual.shape, 0)), np.zeros((n, 0, 0)))
+    )
     return Linearised(point, residual, J_p, basis, triangle)
 
 
@@ -238,9 +238,7 @@ def normal_equations(at: Linearised, unknowns: Unknowns) -> Normal:
     return Normal(hessian, gradient * free, r, flat.reshape(J.shape), unknowns.precision * free)
 
 
-def _damped_steps(
-    at: Linearised, unknowns: Unknowns
-) -> list[tuple[np.ndarray, np.ndarray]]:
+def _damped_steps(at: Linearised, unknowns: Unknowns) -> list[tuple[np.ndarray, np.ndarray]]:
     """Gauss-Newton steps of unknowns and start states, one per damping."""
     normal = normal_equations(at, unknowns)
     H, g = normal.hessian, normal.gradient

@@ -72,6 +72,13 @@ def nominal_unknowns(
     deviations, fixed = dict(deviations or {}), set(fixed)
     measured = {signal.name for signal in plant.measured_inputs}
     free = [name for c in added for name in (c.strength, *c.forms) if name not in fixed]
+    fixed |= {
+        name
+        for c in plant.candidates.values()
+        if values[c.strength] == known[c.strength].null
+        for name in c.forms
+        if name not in free
+    }
     rows = []
     for name, value in values.items():
         deviation = deviations.get(name, known[name].standard_deviation(value))

@@ -116,7 +116,9 @@ class Windows:
         recorded = np.maximum((self.weight > 0).sum(axis=2), 1)
         squares = (residual**2).sum(axis=2)
         size, noise = self.scale * np.sqrt(squares / recorded), self.noise[:, None]
-        correlated = np.clip(residual.sum(axis=2) ** 2 / np.maximum(squares, 1e-300), 1, self.length)
+        correlated = np.clip(
+            residual.sum(axis=2) ** 2 / np.maximum(squares, 1e-300), 1, self.length
+        )
         moves = self.activity > ACTIVE * noise
         quiet = np.maximum(_median_where(~moves, size), noise)
         beyond = np.sqrt(np.maximum(size**2 - quiet**2, 0.0))
@@ -182,7 +184,9 @@ class Windows:
         """Weighted residuals, measured minus simulated, shape (n_plants, n_y, n_windows, L)."""
         error = np.nan_to_num(self.measured) - self.simulated(plants, starts)
         weighted = np.where(self.weight > 0, error * self.weight, 0.0)
-        return np.nan_to_num(weighted, nan=UNSEEN_PENALTY, posinf=UNSEEN_PENALTY, neginf=-UNSEEN_PENALTY)
+        return np.nan_to_num(
+            weighted, nan=UNSEEN_PENALTY, posinf=UNSEEN_PENALTY, neginf=-UNSEEN_PENALTY
+        )
 
     @cached_property
     def _run(self) -> ca.Function:
@@ -190,7 +194,9 @@ class Windows:
 
     def _inputs(self, plant: Plant) -> tuple[np.ndarray, np.ndarray]:
         """Commands and measured inputs of all windows side by side, (n_u, n L) and (n_d, n L)."""
-        timing = tuple(m for m in plant.effects if not m.absent and type(m).resample is not Effect.resample)
+        timing = tuple(
+            m for m in plant.effects if not m.absent and type(m).resample is not Effect.resample
+        )
         if timing:
             return _cut_inputs(plant, self.recordings, self.firsts, self.length)
         return self._plain_inputs
@@ -270,8 +276,10 @@ def _firsts(recording: Recording, length: int) -> tuple[int, ...]:
 
 def _cut(rows: np.ndarray, firsts: tuple[int, ...], length: int) -> np.ndarray:
     """Rows (n, samples) cut into (n, n_windows, L)."""
-    return np.stack([rows[:, k : k + length] for k in firsts], axis=1) if firsts else np.zeros(
-        (rows.shape[0], 0, length)
+    return (
+        np.stack([rows[:, k : k + length] for k in firsts], axis=1)
+        if firsts
+        else np.zeros((rows.shape[0], 0, length))
     )
 
 

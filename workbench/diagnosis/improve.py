@@ -1,0 +1,252 @@
+"""Adding what is missing, and watching the error fall: one effect, or until nothing earns its place.
+
+Each round starts from the rig's own priors with the effects accepted so far free, so parameters
+that had moved to imitate a missing effect can move back once it is there.
+
+Source: diagnosis.md 1.10 (forward selection with a new scan after each acceptance).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+from workbench.diagnosis.diagnose import Progress, diagnose, silent
+from workbench.diagnosis.errors import signal_errors
+from workbench.diagnosis.problem import Problem, pose, split
+from workbench.diagnosis.refit import posterior_deviation, refit
+from workbench.diagnosis.result import Diagnosis, SignalError
+from workbench.diagnosis.scan import scan
+from workbench.fitting.gauss_newton import Fit
+from workbench.plant import Candidate, require
+from workbench.recording import Recording
+from workbench.rig import Rig
+
+MOST_ROUNDS = 8
+Errors = Mapping[str, Mapping[str, SignalError]]
+
+
+@dataclass(frozen=True)
+class Moved:
+    """One parameter before and after: values, posterior and prior standard deviations in SI."""
+
+    name: str
+    before: float
+    after: float
+    deviation: float
+    prior_deviation: float
+
+
+@dataclass(frozen=True)
+class Addition:
+    """One effect added and fitted: the new rig, errors before and after, parameters."""
+
+    rig: Rig
+    candidate: Candidate
+    before: Errors
+    after: Errors
+    drop_train: float
+    drop_validation: float
+    parameters: tuple[Moved, ...]
+    fit: Fit = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Improvement:
+    """Rounds of diagnosis and addition.
+
+    budget    (label, chi2 per sample in training, the same in validation), from bare to final
+    """
+
+    rig: Rig
+    steps: tuple[Addition, ...]
+    diagnoses: tuple[Diagnosis, ...]
+    budget: tuple[tuple[str, float, float], ...]
+
+
+def add(
+    rig: Rig,
+    name: str,
+    train: Sequence[Recording],
+    validation: Sequence[Recording] = (),
+    progress: Progress = silent,
+) -> Addition:
+    """Add one effect of the catalogue to a rig and refit.
+
+    Raises
+    ------
+    KeyError
+        If the plant has no such effect for these recordings, with the nearest name.
+    ValueError
+        If the effect is there already, or only a shift of a parameter that is fitted anyway.
+    """
+    if not validation:
+        train, validation = split(train)
+    plant = rig.fit_for(train[0])
+    require([name], plant.candidates, plant.name)
+    candidate = plant.candidates[name]
+    progress("prior fit")
+    problem = pose(rig, train, validation)
+    if candidate in problem.added or _present(problem, candidate):
+        raise ValueError(f"{name}: {rig.name} has it already; fit moves it")
+    progress(f"refit with {name}")
+    base = problem.base
+    profiles = scan(problem.whole, base.windows, base.unknowns, base.point, [candidate])
+    found = refit(problem, profiles[0])
+    drops = (found.drop_train, found.drop_validation)
+    return _addition(rig, problem, candidate, found.fit, found.validation, drops)
+
+
+def improve(
+    rig: Rig,
+    train: Sequence[Recording],
+    validation: Sequence[Recording] = (),
+    progress: Progress = silent,
+) -> Improvement:
+    """Diagnose and add until nothing in the catalogue earns its place.
+
+    The effect added is the first of the ranking where it passes every criterion, also where an
+    empirical law would do better: a physical effect comes first.
+    """
+    if not validation:
+        train, validation = split(train)
+    steps: list[Addition] = []
+    diagnoses: list[Diagnosis] = []
+    current = rig
+    for count in range(1, MOST_ROUNDS + 1):
+        progress(f"round {count}")
+        diagnosis = diagnose(current, train, validation, progress)
+        diagnoses.append(diagnosis)
+        best = diagnosis.ranking[0] if diagnosis.ranking else None
+        if best is None or best.fit is None or not best.accepted:
+            break
+        problem = pose_again(current, diagnosis)
+        held_out = problem.validated(best.fit)
+        drops = (best.drop_train, best.drop_validation)
+        step = _addition(current, problem, best.candidate, best.fit, held_out, drops)
+        progress(f"accepted {best.candidate.name}")
+        steps.append(step)
+        current = _freed(current, best.candidate, best.fit)
+    final = steps[-1].rig if steps else rig
+    return Improvement(final, tuple(steps), tuple(diagnoses), _budget(diagnoses))
+
+
+def pose_again(rig: Rig, diagnosis: Diagnosis) -> Problem:
+    """The problem that a diagnosis was made on, without fitting it again."""
+    plant = rig.fit_for(diagnosis.base.windows.recordings[0])
+    added = tuple(plant.candidates[n] for n in rig.added if n in plant.candidates)
+    return Problem(rig, plant, added, diagnosis.base, diagnosis.base_validation)
+
+
+def fitted_rig(rig: Rig, fit: Fit, added: Sequence[str], note: str = "") -> Rig:
+    """The rig at fitted values with their standard deviations, and one note more."""
+    ours = rig.plant.values
+    values = {n: v for n, v in fit.plant.values.items() if n in ours and n in fit.unknowns.names}
+    deviations = dict(zip(fit.unknowns.names, posterior_deviation(fit).tolist(), strict=True))
+    return replace(
+        rig,
+        plant=rig.plant.with_values(values),
+        added=(*rig.added, *added),
+        deviations={**rig.deviations, **{n: d for n, d in deviations.items() if d > 0}},
+        notes=(*rig.notes, note) if note else rig.notes,
+    )
+
+
+def _present(problem: Problem, candidate: Candidate) -> bool:
+    """True where the base fit moves the cause already."""
+    moved = problem.base.unknowns.names
+    return candidate.held in moved or (
+        candidate.strength in moved and not candidate.cause.tolerated
+    )
+
+
+def _freed(rig: Rig, candidate: Candidate, fit: Fit) -> Rig:
+    """The rig with its own priors and one more free effect; what was added starts where it is."""
+    ours, values = rig.plant.values, fit.plant.values
+    unknowns = fit.unknowns
+    free = [n for n, w in zip(unknowns.names, unknowns.precision, strict=True) if w < 1.0]
+    found = {name: values[name] for name in free if name in ours}
+    if not _is_new(rig, candidate):
+        return replace(
+            rig, plant=rig.plant.with_values(found), deviations=_loosened(rig, fit, free)
+        )
+    added = (*rig.added, candidate.name)
+    return replace(rig, plant=rig.plant.with_values(found), added=added)
+
+
+def _is_new(rig: Rig, candidate: Candidate) -> bool:
+    """True for a cause that is absent from the rig's plant, not a shift of what it has."""
+    known = rig.plant.parameters[candidate.strength]
+    absent = rig.plant.values.get(candidate.strength, known.null) == known.null
+    return candidate.held is None and absent
+
+
+def _loosened(rig: Rig, fit: Fit, free: list[str]) -> dict[str, float]:
+    """Standard deviations in which a parameter that left its prior is known as the fit knows it."""
+    known = dict(zip(fit.unknowns.names, posterior_deviation(fit).tolist(), strict=True))
+    return {**rig.deviations, **{name: known[name] for name in free}}
+
+
+def _addition(
+    rig: Rig,
+    problem: Problem,
+    candidate: Candidate,
+    fit: Fit,
+    held_out: Fit | None,
+    drops: tuple[float, float],
+) -> Addition:
+    share, unseen = drops
+    note = f"{candidate.name}: error {share:.0%} smaller in training, {unseen:.0%} in validation"
+    return Addition(
+        rig=fitted_rig(rig, fit, [candidate.name] if _is_new(rig, candidate) else [], note),
+        candidate=candidate,
+        before=errors_of(problem.base, problem.base_validation),
+        after=errors_of(fit, held_out),
+        drop_train=share,
+        drop_validation=unseen,
+        parameters=moved_parameters(fit),
+        fit=fit,
+    )
+
+
+def errors_of(train: Fit, validation: Fit | None) -> Errors:
+    """Errors in units of a fit and of its validation."""
+    found = {"train": signal_errors(train)}
+    return {**found, "validation": signal_errors(validation)} if validation else found
+
+
+def moved_parameters(fit: Fit) -> tuple[Moved, ...]:
+    """What a fit moved, with standard deviations."""
+    values, unknowns = fit.plant.values, fit.unknowns
+    deviation = posterior_deviation(fit)
+    return tuple(
+        Moved(name, float(prior), values[name], float(d), float(s) if w >= 1.0 else float("inf"))
+        for name, prior, s, w, d in zip(
+            unknowns.names,
+            unknowns.prior,
+            unknowns.scale,
+            unknowns.precision,
+            deviation,
+            strict=True,
+        )
+    )
+
+
+def _budget(diagnoses: Sequence[Diagnosis]) -> tuple[tuple[str, float, float], ...]:
+    """Error of the base of every round: each stands for what the round before accepted."""
+    rows = []
+    label = "as it came"
+    for diagnosis in diagnoses:
+        rows.append((label, _per_sample(diagnosis.base), _per_sample(diagnosis.base_validation)))
+        if diagnosis.ranking:
+            label = f"+ {diagnosis.ranking[0].candidate.name}"
+    return tuple(rows)
+
+
+def _per_sample(fit: Fit | None) -> float:
+    """Mean squared error in noise deviations: the same yardstick in every round."""
+    if fit is None:
+        return float("nan")
+    windows = fit.windows
+    error = fit.residual * windows.scale[:, :, None] / windows.noise[:, None, None]
+    return float((error**2).sum() / windows.count)

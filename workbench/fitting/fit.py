@@ -1,0 +1,128 @@
+"""Parameter estimation with priors: what moved, how well it is known, what cannot be told apart."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from workbench.diagnosis.improve import Errors, errors_of, fitted_rig
+from workbench.diagnosis.problem import Problem, pose, split
+from workbench.fitting.gauss_newton import Fit, linearise, normal_equations, refit_starts
+from workbench.plant import require
+from workbench.recording import Recording
+from workbench.rig import Rig
+
+FLAT = 0.98  # posterior over prior deviation: the recording says nothing of the parameter
+AT_BOUND = 1e-9
+
+
+@dataclass(frozen=True)
+class FittedParameter:
+    """One parameter: prior and posterior in SI.
+
+    flat        the recording left its prior as it was
+    at_bound    the fit pushed it to the end of its range
+    """
+
+    name: str
+    prior: float
+    prior_deviation: float
+    value: float
+    deviation: float
+    at_bound: bool
+    flat: bool
+
+
+@dataclass(frozen=True)
+class FitReport:
+    """A fitted rig: parameters, their correlations (n_p, n_p) and errors before and after."""
+
+    rig: Rig
+    rows: tuple[FittedParameter, ...]
+    correlations: np.ndarray
+    before: Errors
+    after: Errors
+    converged: bool
+    fit: Fit = field(repr=False)
+
+
+def fit(
+    rig: Rig,
+    train: Sequence[Recording],
+    validation: Sequence[Recording] = (),
+    only: Sequence[str] = (),
+    progress: Callable[[str], None] = lambda message: None,
+) -> FitReport:
+    """Fit what is uncertain in a rig, within its priors.
+
+    ``only`` restricts the fit to the named parameters (full names); all others stay.
+
+    Raises
+    ------
+    KeyError
+        If ``only`` names what the plant does not have, with the nearest name.
+    """
+    plant = rig.fit_for(train[0])
+    require(only, plant.values, plant.name)
+    if only:
+        others = frozenset(name for name in plant.values if name not in only)
+        held = replace(rig, fixed=rig.fixed | others)
+    else:
+        held = rig
+    if not validation:
+        train, validation = split(train)
+    progress("fit")
+    problem = pose(held, train, validation)
+    before = _untouched(problem)
+    base = problem.base
+    return FitReport(
+        rig=fitted_rig(rig, base, ()),
+        rows=_rows(base),
+        correlations=_correlations(base),
+        before=before,
+        after=errors_of(base, problem.base_validation),
+        converged=base.converged,
+        fit=base,
+    )
+
+
+def _untouched(problem: Problem) -> Errors:
+    """Errors of the rig as it came, only start states fitted."""
+    train = refit_starts(problem.base.windows, problem.base.windows.plant.values)
+    held_out = problem.base_validation
+    values: Mapping[str, float] = problem.base.windows.plant.values
+    return errors_of(train, refit_starts(held_out.windows, values) if held_out else None)
+
+
+def _covariance(fit: Fit) -> np.ndarray:
+    """Posterior covariance of the scaled unknowns, (n_p, n_p)."""
+    normal = normal_equations(linearise(fit.windows, fit.unknowns, fit.point), fit.unknowns)
+    return np.linalg.inv(normal.hessian)
+
+
+def _correlations(fit: Fit) -> np.ndarray:
+    covariance = _covariance(fit)
+    deviation = np.sqrt(np.diag(covariance))
+    return covariance / np.outer(deviation, deviation)
+
+
+def _rows(fit: Fit) -> tuple[FittedParameter, ...]:
+    unknowns, values = fit.unknowns, fit.plant.values
+    deviation = np.sqrt(np.diag(_covariance(fit)))
+    rows = []
+    for k, name in enumerate(unknowns.names):
+        room = min(values[name] - unknowns.lower[k], unknowns.upper[k] - values[name])
+        rows.append(
+            FittedParameter(
+                name=name,
+                prior=float(unknowns.prior[k]),
+                prior_deviation=float(unknowns.scale[k]),
+                value=values[name],
+                deviation=float(deviation[k] * unknowns.scale[k]),
+                at_bound=bool(room <= AT_BOUND * unknowns.scale[k]),
+                flat=bool(deviation[k] > FLAT),
+            )
+        )
+    return tuple(rows)
