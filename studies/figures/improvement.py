@@ -44,7 +44,7 @@ def before_after_figure(
     """RMSE over windows of each output before and after, on each set."""
     outputs = list(next(iter(before.values())))
     with styled():
-        figure = new_figure(PAGE_IN, 2.0)
+        figure = new_figure(PAGE_IN, 2.2)
         panels = figure.subplots(1, len(outputs), squeeze=False)[0]
         for axes, output in zip(panels, outputs, strict=True):
             full = unit_of.get(output, output)
@@ -66,5 +66,6 @@ def before_after_figure(
             axes.grid(False, axis="x")
             axes.set_ylabel(f"RMSE ({display_unit(full)})")
             axes.set_title(public_name(output).replace(".", " ").replace("_", " "))
-        panels[0].legend()
+        handles, labels = panels[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=len(handles))
     return figure

@@ -101,7 +101,7 @@ def _drawn(folder: Path, name: str) -> dict[str, str]:
 
 def inline(svg: str, name: str) -> str:
     """The SVG element alone, with names of its own: a page holds several."""
-    start = svg.index("<svg")
-    own = re.sub(r'\bid="', f'id="{name}-', svg[start:])
+    bare = re.sub(r"<metadata>.*?</metadata>", "", svg[svg.index("<svg") :], flags=re.DOTALL)
+    own = re.sub(r'\bid="', f'id="{name}-', bare)
     own = re.sub(r'href="#', f'href="#{name}-', own)
     return re.sub(r"url\(#", f"url(#{name}-", own)
