@@ -1,7 +1,7 @@
 """One round of diagnosis: which physical effect is missing.
 
-Prior fit, projected profile scan over the catalogue, refits of the best few, judgement on a held-out
-recording, ties, and the verdict in words.  Nothing is changed and nothing is written.
+Prior fit, projected profile scan over the catalogue, refits of the best few, judgement on a
+held-out recording, ties, and the verdict in words.  Nothing is changed and nothing is written.
 
 Source: diagnosis.md 1.2 to 1.9.
 """
@@ -119,7 +119,9 @@ def _scanned(problem: Problem) -> list[Profile]:
 def _ranking(
     problem: Problem, profiles: list[Profile], refits: list[Refit], moved: list[Shift]
 ) -> tuple[Ranked, ...]:
-    """All candidates, best first: refits and shifts of parameters, those that the held-out
+    """All candidates, best first.
+
+    Refits, among them shifts of parameters, come first, then the refits that the held-out
     recording refuses, then the rest by the scan.
     """
     by_name = {profile.candidate.name: profile for profile in profiles}

@@ -1,4 +1,4 @@
-"""Adding what is missing, and watching the error fall: one effect, or until nothing earns its place.
+"""Adding what is missing, and watching the error fall: one effect, or until nothing helps.
 
 Each round starts from the rig's own priors with the effects accepted so far free, so parameters
 that had moved to imitate a missing effect can move back once it is there.

@@ -106,8 +106,8 @@ def _law(problem: Problem, best: Refit, accepted: list[Candidate]) -> Law:
     values = best.fit.plant.values
     terms = {c.strength: values[c.strength] for c in accepted}
     text = " and ".join(
-        f"a term in {c.cause.drivers[0]} on {c.place} ({c.cause.strength} = {values[c.strength]:.3g})"
-        for c in accepted
+        f"a term in {c.cause.drivers[0]} on {c.place} ({c.cause.strength} = {size:.3g})"
+        for c, size in zip(accepted, terms.values(), strict=True)
     )
     windows = best.fit.windows
     ranges = {

@@ -14,6 +14,8 @@ import numpy as np
 from workbench.diagnosis.problem import Problem, misfit
 from workbench.diagnosis.result import Size
 from workbench.diagnosis.scan import Profile, Trial, staged
+from workbench.diagnosis.shifts import Shift
+from workbench.fitting.error_model import OUTLYING
 from workbench.fitting.gauss_newton import (
     Fit,
     Point,
@@ -22,9 +24,8 @@ from workbench.fitting.gauss_newton import (
     linearise,
     normal_equations,
 )
-from workbench.diagnosis.shifts import Shift
 from workbench.fitting.unknowns import WIDE, Unknowns
-from workbench.fitting.windows import OUTLYING, Windows
+from workbench.fitting.windows import Windows
 from workbench.plant import Candidate
 
 STARTS = 2  # sizes of the scan that are followed
@@ -170,7 +171,7 @@ def _distinct(trials: tuple[Trial, ...]) -> list[Trial]:
 def _start(
     problem: Problem, windows: Windows, unknowns: Unknowns, trial: Trial, share: float
 ) -> Point:
-    """Base values moved by a share of the trial's linear step, with the candidate at the trial's size."""
+    """Base values moved by a share of a trial's linear step, the candidate at its size."""
     base = problem.base
     moved = base.unknowns.clipped(base.point.t + share * trial.nuisance)
     values = {**windows.plant.values, **base.unknowns.values(moved), **trial.values}

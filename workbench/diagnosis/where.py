@@ -18,8 +18,8 @@ import numpy as np
 from workbench.comparison.regimes import regimes, shares
 from workbench.diagnosis.problem import Problem
 from workbench.diagnosis.result import Dependence, Where
-from workbench.fitting.gauss_newton import Fit
 from workbench.filtering import FilterResult, filter_pass, smooth
+from workbench.fitting.gauss_newton import Fit
 from workbench.parts import Body, Chamber
 from workbench.plant import Plant
 from workbench.recording import Recording

@@ -87,7 +87,7 @@ def _follow_gas(plant: Plant, chamber: Chamber, recording: Recording, states: np
 def _folded(
     flow: ca.Function, mass: float, columns: list[np.ndarray], p: np.ndarray, dt: float
 ) -> np.ndarray:
-    """The followed mass after every sample, shape (n,), in chunks: a long graph is dear to build."""
+    """The followed mass after every sample, shape (n,), in chunks: long graphs build slowly."""
     n = columns[0].shape[1]
     chunk = flow.mapaccum(CHUNK)
     found = np.zeros(0)

@@ -17,8 +17,8 @@ class Unknowns:
     """Free parameters with their prior, bounds and steps for differences; each array (n_p,).
 
     A fit moves t = (value - prior) / scale.  ``precision`` is the prior's weight on t**2, 1 for a
-    parameter with a prior and nearly 0 for an added cause.  ``held`` are values that stay as they are
-    but differ from the plant's.
+    parameter with a prior and nearly 0 for an added cause.  ``held`` are values that stay as they
+    are but differ from the plant's.
     """
 
     names: tuple[str, ...]

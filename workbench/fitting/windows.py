@@ -1,21 +1,11 @@
 """Recordings cut into short windows whose start states are free, and the model run on all at once.
 
 Positions integrate: over a whole recording every small error of a flow or a force drifts away.
-Over short windows forces and flows stay visible and drift is cut (diagnosis.md 1.1).  Two
-tenths of a second are a few pressure time constants of a servo drive; where the slide sticks, longer
+Over short windows forces and flows stay visible and drift is cut (diagnosis.md 1.1).  Two tenths
+of a second are a few pressure time constants of a servo drive; where the slide sticks, longer
 windows run across break-aways and are far from linear in anything (diagnosis.md 4.5).
 
-Residuals are divided by a *scale* per output and window.  Sensor noise alone is a poor one: with a
-5 um position sensor a 1 mm error of a model outweighs every pressure, and a stroke outweighs the
-quiet second in which a leak shows.  So the scale is
-
-    scale^2 = tau (quiet^2 + (rho activity)^2)
-
-with the activity the standard deviation of the output within the window, quiet and rho the typical
-errors of the model where the output rests (at least the noise) and as a share of the activity where
-it moves, and tau the correlation time of those errors in samples: 10 000 correlated samples are
-worth a few hundred, and counted in full they would push every parameter out of its prior.  Windows
-far worse than that (a break-away at the wrong instant) count no more than one three times worse.
+What residuals are divided by is in :mod:`workbench.fitting.error_model`.
 """
 
 from __future__ import annotations
@@ -28,6 +18,7 @@ import casadi as ca
 import numpy as np
 
 from workbench.effect import Effect
+from workbench.fitting.error_model import OUTLYING, ErrorModel, error_model
 from workbench.fitting.starts import guessed_states
 from workbench.plant import Plant
 from workbench.recording import Recording
@@ -35,25 +26,7 @@ from workbench.simulation import inputs
 
 WINDOW_S = 0.2
 UNSEEN_PENALTY = 1e3  # residual in standard deviations of a sample that could not be simulated
-ACTIVE = 5.0  # noise deviations of an output that moves within a window
-OUTLYING = 3.0  # windows worse than this many typical errors count no more than one that is
 THREADS = 2
-
-
-@dataclass(frozen=True)
-class ErrorModel:
-    """Typical errors of a model: see the module's docstring.  Every field has shape (n_y, 1)."""
-
-    quiet: np.ndarray
-    share: np.ndarray
-    quiet_samples: np.ndarray
-    moving_samples: np.ndarray
-
-    def scale(self, activity: np.ndarray, noise: np.ndarray, correlated: bool = True) -> np.ndarray:
-        """What residuals are to be divided by, shape (n_y, n_windows)."""
-        size = np.sqrt(self.quiet**2 + (self.share * activity) ** 2)
-        samples = np.where(activity > ACTIVE * noise, self.moving_samples, self.quiet_samples)
-        return size * np.sqrt(samples) if correlated else size
 
 
 @dataclass(frozen=True)
@@ -113,22 +86,8 @@ class Windows:
 
     def rescaled(self, residual: np.ndarray) -> Windows:
         """The same windows with scales from weighted residuals (n_y, n_windows, L) of a model."""
-        recorded = np.maximum((self.weight > 0).sum(axis=2), 1)
-        squares = (residual**2).sum(axis=2)
-        size, noise = self.scale * np.sqrt(squares / recorded), self.noise[:, None]
-        correlated = np.clip(
-            residual.sum(axis=2) ** 2 / np.maximum(squares, 1e-300), 1, self.length
-        )
-        moves = self.activity > ACTIVE * noise
-        quiet = np.maximum(_median_where(~moves, size), noise)
-        beyond = np.sqrt(np.maximum(size**2 - quiet**2, 0.0))
-        share = _median_where(moves, beyond / np.maximum(self.activity, noise))
-        model = ErrorModel(
-            quiet,
-            share,
-            np.maximum(_median_where(~moves, correlated), 1.0),
-            np.maximum(_median_where(moves, correlated), 1.0),
-        )
+        noise = self.noise[:, None]
+        model = error_model(residual * self.scale[:, :, None], self.weight, self.activity, noise)
         plain = replace(self, scale=model.scale(self.activity, noise), errors=model)
         return plain.capped(residual * (self.scale / plain.scale)[:, :, None])
 
@@ -257,12 +216,6 @@ def window_run(plant: Plant, sample_time_s: float, length: int) -> ca.Function:
         x = ca.MX(0, length)
     y = model.h.map(length)(x, u, d, ca.repmat(p, 1, length))
     return ca.Function("window", [x0, u, d, p], [y])
-
-
-def _median_where(chosen: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Median of the chosen values of each row, 0 where none is, shape (n, 1)."""
-    rows = [np.median(v[c]) if c.any() else 0.0 for v, c in zip(values, chosen, strict=True)]
-    return np.array(rows)[:, None]
 
 
 def _firsts(recording: Recording, length: int) -> tuple[int, ...]:
