@@ -24,6 +24,8 @@ from workbench.plant import Plant
 
 PARAMETER_STEP = 0.25  # of the scale of an unknown
 START_STEP = 0.25  # of the deviation of a start state
+LONGEST_STEP = 4.0  # of a scaled unknown in one step: beyond, the plant may be another one
+LONGEST_START_STEP = 8.0  # of a start state, in its deviations
 DAMPINGS = (0.0, 0.1, 1.0, 10.0, 100.0)
 AGAIN = 0.05  # relative fall of the cost above which derivatives are used once more
 CONVERGED = 2e-3  # relative fall of the cost below which a fit has converged
@@ -245,10 +247,12 @@ def _damped_steps(at: Linearised, unknowns: Unknowns) -> list[tuple[np.ndarray, 
     steps = []
     for damping in DAMPINGS:
         dt = -np.linalg.solve(H + damping * np.diag(np.diag(H)), g) if len(g) else np.zeros(0)
+        dt = np.clip(dt, -LONGEST_STEP, LONGEST_STEP)
         rest = at.residual + (at.parameters @ dt)
         back = (at.basis.transpose(0, 2, 1) @ rest[:, :, None])[:, :, 0]
         dx = -np.linalg.solve(at.triangle, back[:, :, None])[:, :, 0] if back.shape[1] else back
-        steps.append((dt, dx.T / (1.0 + damping)))
+        dx = np.clip(dx.T / (1.0 + damping), -LONGEST_START_STEP, LONGEST_START_STEP)
+        steps.append((dt, dx))
     return steps
 
 

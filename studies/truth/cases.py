@@ -1,0 +1,54 @@
+"""Drawn cases kept in a file: the misfit rule is dear, and a test wants the same case every time.
+
+python -m studies.truth.cases --seeds 1 2 3 -o studies/truth/cases.json
+
+draws every hidden effect, the law outside the catalogue and the case with nothing hidden, and
+applies the misfit rule (a few minutes a seed).
+"""
+
+import argparse
+import json
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict
+from pathlib import Path
+
+from studies.truth.draw import EFFECTS, Case, Difference, draw
+from studies.truth.misfit import scaled
+
+STORED = Path(__file__).with_name("cases.json")
+
+
+def read_cases(path: Path = STORED) -> dict[tuple[str | None, int], Case]:
+    """Stored cases by hidden effect (None for nothing hidden) and seed."""
+    cases = [_case(numbers) for numbers in json.loads(path.read_text())]
+    return {(case.hidden, case.seed): case for case in cases}
+
+
+def write_cases(cases: Iterable[Case], path: Path) -> None:
+    """Store cases, one per line."""
+    lines = ",\n".join(json.dumps(asdict(case)) for case in cases)
+    path.write_text(f"[\n{lines}\n]\n")
+
+
+def drawn_cases(seeds: Sequence[int]) -> list[Case]:
+    """All cases of these seeds under the misfit rule."""
+    return scaled([draw(hidden, seed) for seed in seeds for hidden in (*EFFECTS, None)])
+
+
+def _case(numbers: dict) -> Case:
+    differences = tuple(Difference(**each) for each in numbers.pop("differences"))
+    pairs = {key: tuple((k, v) for k, v in numbers.pop(key)) for key in ("accessories", "shrunk")}
+    return Case(differences=differences, **pairs, **numbers)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Draw and store; see the module."""
+    parser = argparse.ArgumentParser(prog="python -m studies.truth.cases", description=__doc__)
+    parser.add_argument("--seeds", type=int, nargs="+", required=True)
+    parser.add_argument("-o", "--output", type=Path, default=STORED)
+    asked = parser.parse_args(arguments)
+    write_cases(drawn_cases(asked.seeds), asked.output)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,101 @@
+"""Windows, noise, priors and the Gauss-Newton fit."""
+
+import numpy as np
+import pytest
+
+from workbench.fitting.gauss_newton import fit_windows, refit_starts
+from workbench.fitting.noise import measured_noise
+from workbench.fitting.unknowns import Unknowns, nominal_unknowns
+from workbench.fitting.windows import cut_windows
+from workbench.plants import servo_drive
+from workbench.recording import Recording
+from workbench.simulation import simulate
+
+NOISE = {"slide.position_m": 5e-6, "chamber_a.pressure_pa": 500.0, "chamber_b.pressure_pa": 500.0}
+
+NOTHING = Unknowns((), *(np.zeros(0) for _ in range(5)))
+
+
+@pytest.fixture(scope="module")
+def plant():
+    return servo_drive().lean()
+
+
+@pytest.fixture(scope="module")
+def recording(plant):
+    """2 s of sines through the dead zone, with sensor noise."""
+    time_s = 1e-3 * np.arange(2000)
+    u = 4.95 + 0.9 * np.sin(2 * np.pi * 1.1 * time_s) + 0.3 * np.sin(2 * np.pi * 2.7 * time_s)
+    run = simulate(plant, Recording("sines", 1e-3, {"valve.command_v": u}))
+    rng = np.random.default_rng(5)
+    noisy = {n: run[n] + s * rng.standard_normal(len(run)) for n, s in NOISE.items()}
+    return Recording("sines", 1e-3, {"valve.command_v": u, **noisy})
+
+
+def test_noise_is_found_in_a_moving_recording(plant, recording):
+    found = measured_noise([recording], plant.measured)
+
+    for name, sigma in NOISE.items():
+        assert found[name] == pytest.approx(sigma, rel=0.3)
+
+
+def test_given_noise_comes_before_measured_noise(plant, recording):
+    given = Recording("given", 1e-3, recording.channels, noise={"slide.position_m": 1e-4})
+
+    assert measured_noise([given], plant.measured)["slide.position_m"] == 1e-4
+
+
+def test_windows_of_the_true_plant_leave_noise_alone(plant, recording):
+    windows = cut_windows(plant, [recording], NOISE)
+    fit = refit_starts(windows)
+
+    assert fit.chi2 / windows.count == pytest.approx(1.0, abs=0.1)
+
+
+def test_windows_do_not_cross_gaps(plant, recording):
+    channels = recording.channels
+    split = Recording("split", 1e-3, channels, starts=(0, 950))
+    windows = cut_windows(plant, [split], NOISE)
+
+    assert all(first + windows.length <= 950 or first >= 950 for first in windows.firsts[0])
+
+
+def test_missing_samples_have_no_weight(plant, recording):
+    channels = {**recording.channels, "slide.position_m": recording["slide.position_m"].copy()}
+    channels["slide.position_m"][100:150] = np.nan
+    windows = cut_windows(plant, [Recording("holes", 1e-3, channels)], NOISE)
+
+    assert windows.count == 3 * 2000 - 50
+    assert np.isfinite(refit_starts(windows).chi2)
+
+
+def test_a_fit_brings_a_wrong_mass_back(plant, recording):
+    """Prior 5 %, start 5 % off."""
+    wrong = plant.with_values({"slide.mass_kg": 2.22 * 1.05})
+    windows = cut_windows(wrong, [recording], NOISE)
+    windows = windows.rescaled(fit_windows(windows, NOTHING, iterations=0).residual)
+    unknowns = nominal_unknowns(wrong, fixed=[n for n in wrong.values if n != "slide.mass_kg"])
+    fit = fit_windows(windows, unknowns, iterations=20)
+
+    assert fit.plant.values["slide.mass_kg"] == pytest.approx(2.22, rel=0.01)
+
+
+def test_what_is_absent_fixed_or_known_is_not_moved(plant):
+    unknowns = nominal_unknowns(plant, fixed=["slide.mass_kg"])
+
+    assert "slide.mass_kg" not in unknowns.names
+    assert "chamber_a.area_m2" not in unknowns.names
+    assert "slide.added_mass_kg" not in unknowns.names
+    assert "friction.coulomb_force_n" in unknowns.names
+
+
+def test_an_unknown_at_a_bound_that_wants_beyond_takes_no_part():
+    plant = servo_drive()
+    unknowns = nominal_unknowns(plant)
+    t = np.zeros(len(unknowns))
+    row = unknowns.names.index("command_delay.delay_s")
+    pulled = np.zeros(len(unknowns))
+    pulled[row] = 1.0  # the cost falls towards negative delays
+
+    assert unknowns.pinned(t, pulled)[row]
+    assert not unknowns.pinned(t, -pulled)[row]

@@ -1,0 +1,65 @@
+"""The heart: an effect hidden in recordings of an independent truth is found.
+
+The recordings come from ``studies/truth``: another integrator, richer physics, noise, a dozen small
+differences in every one, and none of the workbench's code.  Four cases run always; the others are
+slow.  One case hides nothing and one a law that no catalogue has: there the right answer is "no".
+"""
+
+import pytest
+
+from studies.hidden_effects import answer, confusion, public_name, recordings, user_rig
+from studies.truth.cases import read_cases
+from studies.truth.draw import HIDDEN
+from workbench.diagnosis.result import Verdict
+
+SEED = 1
+ALWAYS = ("chamber_leak", "coulomb_friction", "piston_leak")
+CASES = read_cases()
+
+
+def diagnosed(hidden):
+    case = CASES[hidden, SEED]
+    ((train, held_out),) = recordings([case])
+    return answer(case, train, held_out)
+
+
+@pytest.mark.parametrize(
+    "hidden",
+    [h if h in ALWAYS else pytest.param(h, marks=pytest.mark.slow) for h in HIDDEN],
+)
+def test_the_hidden_effect_comes_first_or_in_the_printed_tie(hidden):
+    found = diagnosed(hidden)
+
+    assert found.tied, confusion([found])
+    assert len(found.diagnosis.ranking[0].tied_with) <= 2
+
+
+@pytest.mark.parametrize("hidden", ["chamber_leak", "piston_leak"])
+def test_its_size_comes_out_within_a_quarter(hidden):
+    found = diagnosed(hidden)
+    leader = found.diagnosis.ranking[0]
+    (size,) = leader.size.values()
+
+    assert leader.candidate.name == public_name(found.case)
+    assert size.value == pytest.approx(found.case.size, rel=0.25)
+    assert leader.drop_validation > 0.2
+
+
+def test_where_nothing_is_hidden_no_false_name_is_given():
+    assert diagnosed(None).right
+
+
+@pytest.mark.slow
+def test_a_law_outside_the_catalogue_is_called_that():
+    found = diagnosed("quadratic_drag")
+    law = found.diagnosis.law
+
+    assert found.diagnosis.verdict is Verdict.NOT_IN_CATALOGUE
+    assert law.balance == "slide.momentum"
+
+
+def test_the_user_s_rig_lacks_what_is_hidden():
+    rig = user_rig(CASES["coulomb_friction", SEED])
+
+    assert rig.plant.values["friction.coulomb_force_n"] == 0.0
+    assert user_rig(CASES[None, SEED]).plant.values["friction.coulomb_force_n"] > 0.0

@@ -1,0 +1,73 @@
+"""The same loop on real recordings: friction bench and vertical cylinder.
+
+Held-out errors are compared with those of plain least squares, effect by effect, that the data
+set's README gives; they may lie at most 10 % above its best.
+"""
+
+import numpy as np
+import pytest
+
+from workbench.diagnosis.improve import improve
+from workbench.recordings import printed_cylinder, real_data_folder, vertical_cylinder
+from workbench.simulation import simulate
+
+FOLDER = real_data_folder()
+pytestmark = pytest.mark.skipif(
+    FOLDER is None, reason="the real recordings are not beside the project"
+)
+BEST_HELD_OUT_N = {"O-ring257": 1.19, "KDN": 1.06, "X-ring257": 1.38}
+
+
+def improved(seal):
+    train = printed_cylinder.recordings(FOLDER, seal, printed_cylinder.TRAIN_BAR)
+    held_out = printed_cylinder.recordings(FOLDER, seal, printed_cylinder.HELD_OUT_BAR)
+    return improve(printed_cylinder.rig(seal), train, held_out)
+
+
+def names(found):
+    return [step.candidate.name for step in found.steps]
+
+
+def held_out_n(found):
+    return found.steps[-1].after["validation"]["rod.force"].rmse
+
+
+@pytest.mark.filterwarnings("ignore::workbench.reading.RecordingWarning")
+@pytest.mark.parametrize(
+    "seal",
+    ["KDN", pytest.param("O-ring257", marks=pytest.mark.slow),
+     pytest.param("X-ring257", marks=pytest.mark.slow)],
+)  # fmt: skip
+def test_the_bench_starts_with_coulomb_friction_and_ends_at_the_best_held_out_error(seal):
+    found = improved(seal)
+
+    assert names(found)[0] == "coulomb_friction"
+    assert held_out_n(found) <= 1.10 * BEST_HELD_OUT_N[seal]
+    if seal != "O-ring257":
+        assert "friction_pressure" not in names(found)
+
+
+@pytest.mark.slow
+def test_the_vertical_cylinder_starts_with_coulomb_friction_and_predicts_unseen_kicks():
+    kicks = vertical_cylinder.kicks(FOLDER)
+    train, test = kicks[vertical_cylinder.TRAIN], kicks[vertical_cylinder.TEST]
+    found = improve(vertical_cylinder.rig(), train, test)
+
+    assert names(found)[0] == "coulomb_friction"
+    assert whole_kicks_m(found.rig, test) < 8.4e-3  # 7.6 mm with Coulomb and viscous friction
+
+
+def whole_kicks_m(rig, kicks):
+    """RMS of position over kicks simulated from their own start."""
+    errors = [
+        simulate(rig.fit_for(kick).lean(), kick, start(rig, kick))["rod.position_m"]
+        - kick["rod.position_m"]
+        for kick in kicks
+    ]
+    return float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))
+
+
+def start(rig, kick):
+    state = rig.fit_for(kick).lean().initial
+    state[0] = kick["rod.position_m"][0]
+    return state
