@@ -99,14 +99,15 @@ def _compared(rig: Rig, recording: Recording) -> RecordingComparison:
     plant = rig.fit_for(recording).lean()
     noise = _noise(recording, plant.measured)
     measured = {name: recording[name] for name in plant.measured}
-    simulated, notes = _simulated(plant, recording, noise)
+    states = guessed_states(plant, recording)[0]
+    simulated, notes = _simulated(plant, recording, noise, states)
     errors = {
         horizon: {n: signal_error(measured[n], rows[n], noise[n]) for n in rows}
         for horizon, rows in simulated.items()
     }
     horizon = next(name for name in (WINDOW, PLAIN, FREE_RUN, ONE_STEP) if name in simulated)
     squared = _squared(measured, simulated[horizon])
-    chosen = regimes(plant, recording)
+    chosen = regimes(plant, recording, states)
     by_regime = tuple(
         Regime(name, share, float(np.mean(chosen[name])))
         for name, share in shares(chosen, squared).items()
@@ -146,7 +147,7 @@ def _noise(recording: Recording, outputs: tuple[str, ...]) -> dict[str, float]:
 
 
 def _simulated(
-    plant: Plant, recording: Recording, noise: Mapping[str, float]
+    plant: Plant, recording: Recording, noise: Mapping[str, float], states: np.ndarray
 ) -> tuple[dict[str, Rows], list[str]]:
     """Outputs by horizon, and what could not be done."""
     if not plant.model.states:
@@ -157,7 +158,7 @@ def _simulated(
     except ValueError as error:
         notes.append(f"no windows: {error}")
     try:
-        found[FREE_RUN] = _free_run(plant, recording)
+        found[FREE_RUN] = _free_run(plant, recording, states)
     except ArithmeticError as error:
         notes.append(f"no free run: {error}")
     return found, notes
@@ -186,11 +187,11 @@ def _windows(windows: Windows) -> Rows:
     return dict(zip(windows.plant.measured, rows, strict=True))
 
 
-def _free_run(plant: Plant, recording: Recording) -> Rows:
+def _free_run(plant: Plant, recording: Recording, states: np.ndarray) -> Rows:
     """Outputs from the first sample of each piece to its end."""
     pieces = [
-        _outputs(plant, simulate(plant, piece, guessed_states(plant, piece)[0, :, 0]))
-        for piece in recording.pieces
+        _outputs(plant, simulate(plant, piece, states[:, first]))
+        for first, piece in zip(recording.starts, recording.pieces, strict=True)
     ]
     return {name: np.concatenate([piece[name] for piece in pieces]) for name in plant.measured}
 

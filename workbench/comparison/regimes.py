@@ -23,13 +23,16 @@ REVERSAL_S = 0.05  # on either side of a change of direction
 OPEN_SHARE = 1e-3  # of the range of a command, behind the dead zone
 
 
-def regimes(plant: Plant, recording: Recording) -> dict[str, np.ndarray]:
+def regimes(
+    plant: Plant, recording: Recording, states: np.ndarray | None = None
+) -> dict[str, np.ndarray]:
     """Which samples belong to each regime, shape (n,) each; only those that the channels show.
 
-    The valve side is that of the command as the valve gets it, behind offset and dead zone.
+    The valve side is that of the command as the valve gets it, behind offset and dead zone;
+    ``states`` (n_x, n) are guessed from the recording if not given.
     """
     found: dict[str, np.ndarray] = {}
-    for signal, command in _commands(plant, recording).items():
+    for signal, command in _commands(plant, recording, states).items():
         member = signal.rpartition(".")[0]
         closed, size = _closed(plant, signal)
         away = command - closed
@@ -74,13 +77,15 @@ def regime_shares(fit: Fit) -> dict[str, float]:
     return dict(sorted(found.items(), key=lambda item: -item[1]))
 
 
-def _commands(plant: Plant, recording: Recording) -> dict[str, np.ndarray]:
+def _commands(
+    plant: Plant, recording: Recording, states: np.ndarray | None
+) -> dict[str, np.ndarray]:
     """Each command behind all that alters it, shape (n,)."""
     model = plant.model
     if not model.commands:
         return {}
     u, d = inputs(plant, recording)
-    x, p = guessed_states(plant, recording)[0], plant.nominal[2]
+    x, p = guessed_states(plant, recording)[0] if states is None else states, plant.nominal[2]
     values = model.quantities(*model.commands).map(len(recording))(x, u, d, p).full()
     return dict(zip(model.commands, values, strict=True))
 

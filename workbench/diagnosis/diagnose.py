@@ -26,6 +26,7 @@ from workbench.diagnosis.scan import Profile, scan
 from workbench.diagnosis.shifts import LEAVES_PRIOR, Shift, shifts
 from workbench.diagnosis.where import locate
 from workbench.effect import Kind
+from workbench.fitting.windows import MOST_WINDOWS
 from workbench.recording import Recording
 from workbench.rig import Rig
 
@@ -48,11 +49,12 @@ def diagnose(
     train: Sequence[Recording],
     validation: Sequence[Recording] = (),
     progress: Progress = silent,
+    most_windows: int = MOST_WINDOWS,
 ) -> Diagnosis:
     """Which effect of the catalogue is missing, judged on held-out recordings.
 
     Without ``validation`` the last third of each recording is held out, and the verdict is at most
-    a tie, with a warning.
+    a tie, with a warning.  ``most_windows`` bounds the windows that are fitted: fewer are faster.
 
     Raises
     ------
@@ -65,7 +67,7 @@ def diagnose(
         train, validation = split(train)
         warnings = ("no validation recording: the last third is held out, which is weak evidence",)
     progress("prior fit")
-    problem = pose(rig, train, validation)
+    problem = pose(rig, train, validation, most_windows)
     if not problem.base.converged:
         warnings += ("the prior fit did not converge: the ranking is provisional",)
     progress("scan of the catalogue")

@@ -120,15 +120,28 @@ def improve(
         best = diagnosis.ranking[0] if diagnosis.ranking else None
         if best is None or best.fit is None or not best.accepted:
             break
-        problem = pose_again(current, diagnosis)
-        held_out = problem.validated(best.fit)
-        drops = (best.drop_train, best.drop_validation)
-        step = _addition(current, problem, best.candidate, best.fit, held_out, drops)
         progress(f"accepted {best.candidate.name}")
-        steps.append(step)
+        steps.append(accept(current, diagnosis))
         current = _freed(current, best.candidate, best.fit)
     final = steps[-1].rig if steps else rig
     return Improvement(final, tuple(steps), tuple(diagnoses), _budget(diagnoses))
+
+
+def accept(rig: Rig, diagnosis: Diagnosis) -> Addition:
+    """What the ranking of a diagnosis puts first, added to the rig as it was fitted there.
+
+    Raises
+    ------
+    ValueError
+        If the first of the ranking was not refitted.
+    """
+    best = diagnosis.ranking[0] if diagnosis.ranking else None
+    if best is None or best.fit is None:
+        raise ValueError(f"{diagnosis.rig_name}: the diagnosis followed no candidate to a refit")
+    problem = pose_again(rig, diagnosis)
+    held_out = problem.validated(best.fit)
+    drops = (best.drop_train, best.drop_validation)
+    return _addition(rig, problem, best.candidate, best.fit, held_out, drops)
 
 
 def pose_again(rig: Rig, diagnosis: Diagnosis) -> Problem:

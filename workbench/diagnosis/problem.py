@@ -9,7 +9,7 @@ from workbench.diagnosis.scan import staged
 from workbench.fitting.gauss_newton import Fit, fit_windows, refit_starts
 from workbench.fitting.noise import measured_noise
 from workbench.fitting.unknowns import Unknowns, nominal_unknowns
-from workbench.fitting.windows import WINDOW_S, Windows, cut_windows
+from workbench.fitting.windows import MOST_WINDOWS, WINDOW_S, Windows, cut_windows
 from workbench.plant import Candidate, Plant
 from workbench.recording import Recording
 from workbench.rig import Rig
@@ -66,7 +66,12 @@ def misfit(fit: Fit) -> float:
     return max(fit.chi2 - fit.windows.floor, 1.0)
 
 
-def pose(rig: Rig, train: Sequence[Recording], validation: Sequence[Recording] = ()) -> Problem:
+def pose(
+    rig: Rig,
+    train: Sequence[Recording],
+    validation: Sequence[Recording] = (),
+    most_windows: int = MOST_WINDOWS,
+) -> Problem:
     """Cut, fit twice (the second time with the error model of the first), and validate.
 
     Raises
@@ -78,7 +83,7 @@ def pose(rig: Rig, train: Sequence[Recording], validation: Sequence[Recording] =
     added = tuple(whole.candidates[name] for name in rig.added if name in whole.candidates)
     plant = staged(whole, *(c.member for c in added))
     noise = measured_noise(train, plant.measured)
-    windows = cut_windows(plant, train, noise, window_length_s(plant, train))
+    windows = cut_windows(plant, train, noise, window_length_s(plant, train), most_windows)
     unknowns = nominal_unknowns(plant, rig.deviations, rig.fixed, added)
     untouched = fit_windows(windows, unknowns, iterations=0)
     windows = windows.rescaled(untouched.residual)
@@ -87,7 +92,7 @@ def pose(rig: Rig, train: Sequence[Recording], validation: Sequence[Recording] =
     base = fit_windows(windows, unknowns, rough.point, iterations=ITERATIONS)
     held_out = None
     if validation:
-        held_out = refit_starts(_held_out(validation, base, noise), base.plant.values)
+        held_out = refit_starts(_held_out(validation, base, noise, most_windows), base.plant.values)
     return Problem(rig, whole, added, base, held_out)
 
 
@@ -103,10 +108,12 @@ def window_length_s(plant: Plant, recordings: Sequence[Recording]) -> float:
     return min(shortest * recordings[0].sample_time_s, LONGEST_WINDOW_S)
 
 
-def _held_out(validation: Iterable[Recording], base: Fit, noise: dict[str, float]) -> Windows:
+def _held_out(
+    validation: Iterable[Recording], base: Fit, noise: dict[str, float], most: int
+) -> Windows:
     """Windows of the held-out recordings on the yardstick of the training."""
     length_s = base.windows.length * base.windows.recordings[0].sample_time_s
-    windows = cut_windows(base.windows.plant, validation, noise, length_s)
+    windows = cut_windows(base.windows.plant, validation, noise, length_s, most)
     windows = windows.scaled_like(base.windows)
     return windows.capped(refit_starts(windows, base.plant.values).residual)
 

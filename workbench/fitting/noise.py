@@ -16,8 +16,9 @@ THIRD_DIFFERENCE_GAIN = 20.0  # variance of y3 - 3 y2 + 3 y1 - y0 over that of y
 def measured_noise(recordings: Iterable[Recording], channels: Iterable[str]) -> dict[str, float]:
     """Standard deviation of the noise of each channel.
 
-    Each recording is cut into blocks, and the quietest third gives the noise.  A value given with the recording (``Recording.noise``) comes first.  The floor
-    is the quantisation, one step over sqrt(12).
+    Each recording is cut into blocks, and the quietest third gives the noise.  A value given with
+    the recording (``Recording.noise``) comes first.  The floor is the quantisation, one step over
+    sqrt(12).
 
     Raises
     ------

@@ -25,6 +25,7 @@ from workbench.recording import Recording
 from workbench.simulation import inputs
 
 WINDOW_S = 0.2
+MOST_WINDOWS = 1500  # five minutes: beyond, a fit learns little and takes long
 UNSEEN_PENALTY = 1e3  # residual in standard deviations of a sample that could not be simulated
 THREADS = 2
 
@@ -170,8 +171,11 @@ def cut_windows(
     recordings: Iterable[Recording],
     noise: Mapping[str, float],
     window_s: float = WINDOW_S,
+    most: int = MOST_WINDOWS,
 ) -> Windows:
     """Cut recordings into windows, never across a gap; an incomplete last window is left out.
+
+    Where there are more than ``most``, every so many-th is kept, evenly over the recordings.
 
     Raises
     ------
@@ -180,7 +184,7 @@ def cut_windows(
     """
     recordings = tuple(recordings)
     length = max(round(window_s / recordings[0].sample_time_s), 2)
-    firsts = tuple(_firsts(recording, length) for recording in recordings)
+    firsts = _thinned(tuple(_firsts(recording, length) for recording in recordings), most)
     if not any(firsts):
         raise ValueError(f"no piece of the recordings is as long as one window of {window_s:g} s")
     measured = np.concatenate(
@@ -216,6 +220,16 @@ def window_run(plant: Plant, sample_time_s: float, length: int) -> ca.Function:
         x = ca.MX(0, length)
     y = model.h.map(length)(x, u, d, ca.repmat(p, 1, length))
     return ca.Function("window", [x0, u, d, p], [y])
+
+
+def _thinned(firsts: tuple[tuple[int, ...], ...], most: int) -> tuple[tuple[int, ...], ...]:
+    """At most so many windows, evenly over all recordings."""
+    total = sum(len(own) for own in firsts)
+    if total <= most:
+        return firsts
+    kept = set(np.linspace(0, total - 1, most).round().astype(int).tolist())
+    places = iter(range(total))
+    return tuple(tuple(k for k in own if next(places) in kept) for own in firsts)
 
 
 def _firsts(recording: Recording, length: int) -> tuple[int, ...]:
