@@ -27,6 +27,7 @@ from studies.figures.diagnosis import diagnosis_figures
 from studies.figures.improvement import before_after_figure
 from studies.figures.modes import pole_figure
 from studies.figures.style import save_all
+from studies.figures.summary import summary_figure
 from studies.report.page import FIGURES, Section, write_report
 from studies.text_of_results import addition_text, comparison_text, diagnosis_text, unit_names
 from workbench.comparison import compare
@@ -41,6 +42,7 @@ from workbench.rig_writing import write_rig
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from workbench.comparison.compare import RecordingComparison
     from workbench.diagnosis.result import Diagnosis, Ranked
 
 DATA = Path(__file__).with_name("demo_data")
@@ -80,19 +82,28 @@ def run_demo(folder: Path, command: str, say: Say, show: Say) -> Path:
     rig = load_rig(DATA / "rig.toml")
     train = read_recording(rig, DATA / "train.csv")
     validation = read_recording(rig, DATA / "validation.csv")
-    _compare(story, "The recordings against the plant as it is", rig, validation, "before_")
-    improved = _find_and_add(story, rig, train, validation)
-    if improved is not rig:
-        _compare(story, "The improved plant on the validation recording", improved, validation, "")
+    before = _compare(story, "The recording against the plant as it is", rig, validation, "before_")
+    found = _diagnose(story, rig, train, validation)
+    improved, after = rig, before
+    if found.best is not None:
+        improved = _add(story, rig, found, found.best)
+        title = "The improved plant on the validation recording"
+        after = _compare(story, title, improved, validation, "")
+    write_rig(improved, folder / "improved.toml")
     _linearise(story, improved)
-    _control(story, improved)
+    checked = _control(story, improved)
+    summary = {"summary": summary_figure(found, before, after, checked)}
+    save_all(summary, folder / FIGURES, command)
+    story.sections.insert(0, Section("In short", (found.sentence,), "", (*summary,)))
     say("report")
     page = write_report(folder, "From a recording to a controller", command, story.sections)
     show(f"\nwrote {page}, {folder / FIGURES} and {folder / 'improved.toml'}")
     return page
 
 
-def _compare(story: Story, title: str, rig: Rig, validation: Recording, prefix: str) -> None:
+def _compare(
+    story: Story, title: str, rig: Rig, validation: Recording, prefix: str
+) -> RecordingComparison:
     story.say("comparing")
     found = compare(rig, [validation])
     text = (
@@ -100,21 +111,21 @@ def _compare(story: Story, title: str, rig: Rig, validation: Recording, prefix: 
         "recording.  Positions integrate, so a free run drifts with every small error."
     )
     story.tell(title, text, comparison_text(found), comparison_figures(found, prefix))
+    return found.recordings[0]
 
 
-def _find_and_add(story: Story, rig: Rig, train: Recording, validation: Recording) -> Rig:
-    """The rig with the effect that a diagnosis names; the rig as it is where it names none."""
-    units = unit_names(rig.plant.measured)
+def _diagnose(story: Story, rig: Rig, train: Recording, validation: Recording) -> Diagnosis:
     found = diagnose(rig, [train], [validation], story.say)
-    story.keep("diagnosis.json", diagnosis_document(found, units))
+    story.keep("diagnosis.json", diagnosis_document(found, unit_names(rig.plant.measured)))
     title = "Which effect is missing, and where it shows"
     story.tell(title, found.sentence, diagnosis_text(found, {}), diagnosis_figures(found))
-    if found.best is None:
-        write_rig(rig, story.folder / "improved.toml")
-        return rig
-    added = _accepted(rig, found, found.best)
-    write_rig(added.rig, story.folder / "improved.toml")
-    name = found.best.candidate.name
+    return found
+
+
+def _add(story: Story, rig: Rig, found: Diagnosis, best: Ranked) -> Rig:
+    """The rig with the effect that a diagnosis names."""
+    name, units = best.candidate.name, unit_names(rig.plant.measured)
+    added = _accepted(rig, found, best)
     text = f"{name} is added and fitted with the uncertain parameters; validation is predicted."
     figures = {"before_and_after": before_after_figure(added.before, added.after, units)}
     story.tell(f"Errors before and after {name}", text, addition_text(added, units), figures)
@@ -146,7 +157,7 @@ def _linearise(story: Story, rig: Rig) -> None:
     story.tell("The improved plant as modes", text, table, {"poles": pole_figure(hybrid)})
 
 
-def _control(story: Story, rig: Rig) -> None:
+def _control(story: Story, rig: Rig) -> Check:
     designs = {}
     for method in METHODS:
         story.say(f"designing {method}")
@@ -166,3 +177,4 @@ def _control(story: Story, rig: Rig) -> None:
         f"{1e3 * best.final_error_m:.2g} mm from the target."
     )
     story.tell("Closed loops", text, loop_table(found.rows), styled_figures(found))
+    return found
