@@ -115,7 +115,8 @@ def _scanned(problem: Problem) -> list[Profile]:
         and (c.cause.tolerated or values.get(c.strength, known[c.strength].null)
              == known[c.strength].null)
     ]  # fmt: skip
-    return scan(problem.whole, base.windows, base.unknowns, base.point, absent)
+    at = problem.linearised
+    return scan(problem.whole, base.windows, base.unknowns, base.point, absent, at)
 
 
 def _ranking(

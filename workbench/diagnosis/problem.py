@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from workbench.diagnosis.scan import staged
-from workbench.fitting.gauss_newton import Fit, fit_windows, refit_starts
+from workbench.fitting.gauss_newton import Fit, Linearised, fit_windows, linearise, refit_starts
 from workbench.fitting.noise import measured_noise
 from workbench.fitting.unknowns import Unknowns, nominal_unknowns
 from workbench.fitting.windows import MOST_WINDOWS, WINDOW_S, Windows, cut_windows
@@ -54,6 +55,11 @@ class Problem:
         if fit.windows.plant is not windows.plant:
             windows = windows.with_plant(fit.windows.plant)
         return refit_starts(windows, fit.plant.values)
+
+    @cached_property
+    def linearised(self) -> Linearised:
+        """Residuals and derivatives at the base, for scan, shifts and refits."""
+        return linearise(self.base.windows, self.base.unknowns, self.base.point)
 
     @property
     def misfit(self) -> float:

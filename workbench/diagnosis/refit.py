@@ -18,8 +18,10 @@ from workbench.diagnosis.shifts import Shift
 from workbench.fitting.error_model import OUTLYING
 from workbench.fitting.gauss_newton import (
     Fit,
+    Linearised,
     Point,
     best_start,
+    borrowed,
     fit_windows,
     linearise,
     normal_equations,
@@ -30,7 +32,7 @@ from workbench.plant import Candidate
 
 STARTS = 2  # sizes of the scan that are followed
 TRIED = 3  # iterations of each before the best is chosen
-ITERATIONS = 6
+ITERATIONS = 5
 PROBES = (0.4, 0.6, 0.8, 0.9, 1.15, 1.4, 1.8, 2.5)  # factors on a fitted strength
 
 
@@ -60,7 +62,9 @@ def refit(problem: Problem, profile: Profile) -> Refit:
     tried = []
     for trial in _distinct(profile.trials):
         starts = [_start(problem, windows, unknowns, trial, share) for share in (1.0, 0.5, 0.0)]
-        tried.append(fit_windows(windows, unknowns, best_start(windows, unknowns, starts), TRIED))
+        start = best_start(windows, unknowns, starts)
+        at = _nearby(problem, windows, unknowns, start)
+        tried.append(fit_windows(windows, unknowns, start, TRIED, at))
     best = min(tried, key=lambda each: each.cost)
     fit = best if best.converged else fit_windows(windows, unknowns, best.point, ITERATIONS)
     probed = best_start(windows, unknowns, _probes(fit, candidate.strength))
@@ -77,6 +81,15 @@ def refit(problem: Problem, profile: Profile) -> Refit:
     )
 
 
+def _nearby(
+    problem: Problem, windows: Windows, unknowns: Unknowns, start: Point
+) -> Linearised | None:
+    """The base's derivatives with columns for what is new, where the states are the same."""
+    if windows is not problem.base.windows:
+        return None
+    return borrowed(problem.linearised, problem.base.unknowns, windows, unknowns, start)
+
+
 def refit_shift(problem: Problem, shift: Shift) -> Refit:
     """Fit with the prior of one parameter taken away, and validate it."""
     base = problem.base
@@ -84,7 +97,7 @@ def refit_shift(problem: Problem, shift: Shift) -> Refit:
     precision = base.unknowns.precision.copy()
     precision[row] *= WIDE**-2
     unknowns = replace(base.unknowns, precision=precision)
-    fit = fit_windows(base.windows, unknowns, base.point, ITERATIONS)
+    fit = fit_windows(base.windows, unknowns, base.point, ITERATIONS, problem.linearised)
     validation = problem.validated(fit)
     return Refit(
         candidate=shift.candidate,

@@ -127,9 +127,11 @@ class Metric:
         return float(row.ravel() @ row.ravel()) + prior - gained
 
 
-def metric_at(windows: Windows, unknowns: Unknowns, point: Point) -> Metric:
-    """The metric M at a point, from one batch of simulations."""
-    at = linearise(windows, unknowns, point)
+def metric_at(
+    windows: Windows, unknowns: Unknowns, point: Point, at: Linearised | None = None
+) -> Metric:
+    """The metric M at a point, from derivatives there or from one batch of simulations."""
+    at = at or linearise(windows, unknowns, point)
     return Metric(at, normal_equations(at, unknowns))
 
 
@@ -148,13 +150,15 @@ def scan(
     unknowns: Unknowns,
     point: Point,
     candidates: Iterable[Candidate],
+    at: Linearised | None = None,
 ) -> list[Profile]:
     """Profiles of all candidates, the one that explains most first.
 
     ``whole`` is the windows' plant with all absent effects in their places.  Candidates with
-    states of their own are run on a plant that has them; the others share one.
+    states of their own are run on a plant that has them; the others share one.  ``at`` are the
+    derivatives at the point where they are known already.
     """
-    metric = metric_at(windows, unknowns, point)
+    metric = metric_at(windows, unknowns, point, at)
     values = unknowns.values(point.t)
     groups: dict[tuple[str, ...], list[Candidate]] = {}
     for candidate in candidates:

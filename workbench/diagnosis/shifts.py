@@ -15,7 +15,7 @@ import numpy as np
 
 from workbench.diagnosis.problem import Problem
 from workbench.diagnosis.result import Size
-from workbench.fitting.gauss_newton import linearise, normal_equations
+from workbench.fitting.gauss_newton import normal_equations
 from workbench.plant import Candidate
 
 LEAVES_PRIOR = 3.0
@@ -44,7 +44,7 @@ def shifts(problem: Problem) -> list[Shift]:
     """The shift of every cause whose parameter the base fit may move."""
     base = problem.base
     unknowns, t = base.unknowns, base.point.t
-    normal = normal_equations(linearise(base.windows, unknowns, base.point), unknowns)
+    normal = normal_equations(problem.linearised, unknowns)
     variance = np.clip(np.diag(np.linalg.inv(normal.hessian)), 1e-12, 1.0 - 1e-9)
     found = []
     for candidate in problem.whole.candidates.values():

@@ -27,7 +27,7 @@ START_STEP = 0.25  # of the deviation of a start state
 LONGEST_STEP = 4.0  # of a scaled unknown in one step: beyond, the plant may be another one
 LONGEST_START_STEP = 8.0  # of a start state, in its deviations
 DAMPINGS = (0.0, 0.1, 1.0, 10.0, 100.0)
-AGAIN = 0.05  # relative fall of the cost above which derivatives are used once more
+AGAIN = 0.02  # relative fall of the cost above which derivatives are used once more
 CONVERGED = 2e-3  # relative fall of the cost below which a fit has converged
 
 
@@ -108,17 +108,21 @@ class Fit:
 
 
 def fit_windows(
-    windows: Windows, unknowns: Unknowns, start: Point | None = None, iterations: int = 8
+    windows: Windows,
+    unknowns: Unknowns,
+    start: Point | None = None,
+    iterations: int = 8,
+    at: Linearised | None = None,
 ) -> Fit:
     """Fit the unknowns and the start states; see the module's docstring.
 
     Every step is taken only if the cost falls; a batch of damped steps is tried at once.  As long
-    as a step halves what the last one gained or better, the next uses the same derivatives again:
-    they are the dear part.
+    as steps bring more than 2 %, the next uses the same derivatives again: they are the dear part.
+    ``at`` are derivatives to begin with, taken near by.
     """
     point = start or Point(unknowns.scaled(windows.plant.values), windows.start)
     chi2, cost = (v[0] for v in _costs(windows, unknowns, [point]))
-    at, fresh, converged = None, False, False
+    fresh, converged = False, False
     for _ in range(iterations):
         if at is None:
             at, fresh = linearise(windows, unknowns, point), True
@@ -137,6 +141,30 @@ def fit_windows(
         else:
             at = None
     return Fit(windows, unknowns, point, float(chi2), float(cost), converged)
+
+
+def borrowed(
+    near: Linearised, known: Unknowns, windows: Windows, unknowns: Unknowns, point: Point
+) -> Linearised:
+    """Derivatives at a point from those near by, with columns of their own for what is new there.
+
+    ``near`` belongs to the unknowns ``known`` on windows with the same states.
+    """
+    h, t = _parameter_steps(unknowns, point.t), point.t
+    new = [k for k, name in enumerate(unknowns.names) if name not in known.names]
+    plants = [_plant_at(windows, unknowns, t + h[k] * unit(len(t), k)) for k in new]
+    plants.append(_plant_at(windows, unknowns, t))
+    r = windows.residuals(plants, point.starts).transpose(0, 2, 1, 3)
+    r = r.reshape(len(plants), len(windows), -1)
+    J = np.zeros((*near.residual.shape, len(unknowns)))
+    for k, name in enumerate(unknowns.names):
+        if name in known.names:
+            J[:, :, k] = near.parameters[:, :, known.names.index(name)]
+    for row, k in enumerate(new):
+        J[:, : r.shape[2], k] = (r[row] - r[-1]) / h[k]
+    away = ((point.starts - windows.start) / windows.start_deviation).T
+    residual = np.concatenate([r[-1], away], axis=1)
+    return replace(near, point=point, residual=residual, parameters=J)
 
 
 def _trials(windows: Windows, unknowns: Unknowns, at: Linearised, point: Point) -> list[Point]:
