@@ -32,7 +32,7 @@ from studies.report.page import FIGURES, Section, write_report
 from studies.text_of_results import addition_text, comparison_text, diagnosis_text, unit_names
 from workbench.comparison import compare
 from workbench.diagnosis.diagnose import diagnose
-from workbench.diagnosis.improve import Addition, fitted_rig, moved_parameters
+from workbench.diagnosis.improve import accept
 from workbench.errors import whole_file
 from workbench.reading import read_recording
 from workbench.recording import Recording
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from workbench.comparison.compare import RecordingComparison
-    from workbench.diagnosis.result import Diagnosis, Ranked
+    from workbench.diagnosis.result import Diagnosis
 
 DATA = Path(__file__).with_name("demo_data")
 METHODS = ("pid", "lq", "mpc")
@@ -86,7 +86,7 @@ def run_demo(folder: Path, command: str, say: Say, show: Say) -> Path:
     found = _diagnose(story, rig, train, validation)
     improved, after = rig, before
     if found.best is not None:
-        improved = _add(story, rig, found, found.best)
+        improved = _add(story, rig, found)
         title = "The improved plant on the validation recording"
         after = _compare(story, title, improved, validation, "")
     write_rig(improved, folder / "improved.toml")
@@ -122,30 +122,15 @@ def _diagnose(story: Story, rig: Rig, train: Recording, validation: Recording) -
     return found
 
 
-def _add(story: Story, rig: Rig, found: Diagnosis, best: Ranked) -> Rig:
+def _add(story: Story, rig: Rig, found: Diagnosis) -> Rig:
     """The rig with the effect that a diagnosis names."""
-    name, units = best.candidate.name, unit_names(rig.plant.measured)
-    added = _accepted(rig, found, best)
+    units = unit_names(rig.plant.measured)
+    added = accept(rig, found)
+    name = added.candidate.name
     text = f"{name} is added and fitted with the uncertain parameters; validation is predicted."
     figures = {"before_and_after": before_after_figure(added.before, added.after, units)}
     story.tell(f"Errors before and after {name}", text, addition_text(added, units), figures)
     return added.rig
-
-
-def _accepted(rig: Rig, found: Diagnosis, best: Ranked) -> Addition:
-    """What `add` gives, from the fit that the diagnosis made already."""
-    name = best.candidate.name
-    drops = f"{best.drop_train:.0%} smaller in training, {best.drop_validation:.0%} in validation"
-    return Addition(
-        rig=fitted_rig(rig, best.fit, [name], f"{name}: error {drops}"),
-        candidate=best.candidate,
-        before=found.before,
-        after=found.after,
-        drop_train=best.drop_train,
-        drop_validation=best.drop_validation,
-        parameters=moved_parameters(best.fit),
-        fit=best.fit,
-    )
 
 
 def _linearise(story: Story, rig: Rig) -> None:

@@ -49,7 +49,7 @@ def _recording_text(each: RecordingComparison) -> str:
         [(r.name, percent(r.share_of_error), percent(r.share_of_time)) for r in each.by_regime],
     )
     worst = ", ".join(
-        f"{span.start_s:.2f} to {span.end_s:.2f} s ({percent(span.share_of_error)})"
+        f"{span.start_s:.2f} to {span.end_s:.2f} s ({percent(span.share_of_error, 1)})"
         for span in each.worst
     )
     parts = [f"{each.name}: {each.time_s[-1]:.4g} s", errors, regimes, f"worst: {worst}"]
