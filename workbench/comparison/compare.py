@@ -1,7 +1,7 @@
 """A plant against its recordings, over three horizons, because positions integrate.
 
 one step    innovations of the extended Kalman filter: what is missed within one sample
-window      0.1 s with free start states: forces and flows stay visible, drift is cut
+window      a fifth of a second with free start states: forces and flows stay visible, drift is cut
 free run    the whole recording from its first sample: what a user of a simulation feels
 
 A plant without states has one horizon, ``sample by sample``.
@@ -23,7 +23,7 @@ from workbench.filtering import filter_pass
 from workbench.fitting.gauss_newton import refit_starts
 from workbench.fitting.noise import measured_noise
 from workbench.fitting.starts import guessed_states
-from workbench.fitting.windows import Windows, cut_windows
+from workbench.fitting.windows import WINDOW_S, Windows, cut_windows
 from workbench.plant import Plant
 from workbench.recording import Recording
 from workbench.rig import Rig
@@ -209,8 +209,8 @@ def _squared(measured: Rows, simulated: Rows) -> np.ndarray:
 
 
 def _worst(squared: np.ndarray, sample_time_s: float) -> tuple[Span, ...]:
-    """The stretches of 0.1 s with the largest error."""
-    length = max(round(0.1 / sample_time_s), 1)
+    """The stretches as long as a window with the largest error."""
+    length = max(round(WINDOW_S / sample_time_s), 1)
     total = float(np.nansum(squared))
     firsts = range(0, max(len(squared) - length + 1, 1), length)
     sums = [(float(np.nansum(squared[k : k + length])), k) for k in firsts]

@@ -206,7 +206,8 @@ def _law(
         return None
     progress("empirical law")
     law = empirical_law(problem, balance)
-    best = leader.drop_train if leader and leader.accepted else 0.0
+    followed = [r.drop_train for r in ranking if r.fit is not None and predicts_row(r)]
+    best = max(followed, default=0.0)
     return law if law and law.drop_train > best + LAW_MARGIN else None
 
 

@@ -41,11 +41,14 @@ def empirical_law(problem: Problem, balance: str | None) -> Law | None:
         found = _next_term(problem, accepted)
         if not found or found.drop_train * misfit(problem.base) < LEAST_TERM_SHARE * first.misfit:
             break
-        best = _counted_from(first, found)
+        counted = _counted_from(first, found)
+        if reasons_against(first.base, counted):
+            break
+        best = counted
         accepted.append(found.candidate)
         # The next term is scanned at this fit, and its drop still counts from the first base.
         problem = replace(problem, added=(*problem.added, found.candidate), base=found.fit)
-    if best is None or reasons_against(first.base, best):
+    if best is None:
         return None
     return _law(problem, best, accepted)
 
