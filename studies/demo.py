@@ -34,6 +34,7 @@ from workbench.comparison import compare
 from workbench.diagnosis.diagnose import diagnose
 from workbench.diagnosis.improve import accept
 from workbench.errors import whole_file
+from workbench.fitting.windows import WINDOW_S
 from workbench.reading import read_recording
 from workbench.recording import Recording
 from workbench.rig import Rig, load_rig
@@ -107,8 +108,8 @@ def _compare(
     story.say("comparing")
     found = compare(rig, [validation])
     text = (
-        "One step ahead, over windows of 0.1 s with free start, and as a free run over the whole "
-        "recording.  Positions integrate, so a free run drifts with every small error."
+        f"One step ahead, over windows of {WINDOW_S:g} s with free start, and as a free run over "
+        "the whole recording.  Positions integrate, so a free run drifts with every small error."
     )
     story.tell(title, text, comparison_text(found), comparison_figures(found, prefix))
     return found.recordings[0]

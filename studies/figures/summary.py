@@ -9,6 +9,7 @@ import numpy as np
 from linearize.standard import POSITION
 from studies.figures.style import BLUE, GREY, ORANGE, PAGE_IN, new_figure, styled, thinned
 from workbench.comparison.compare import WINDOW
+from workbench.fitting.windows import WINDOW_S
 from workbench.units import display_scale, display_unit, public_name
 
 if TYPE_CHECKING:
@@ -62,7 +63,7 @@ def _draw_error(axes: Axes, before: RecordingComparison, after: RecordingCompari
     words = public_name(output).replace(".", " ").replace("_", " ")
     axes.set_xlabel("time (s)")
     axes.set_ylabel(f"error of {words} ({display_unit(output)})")
-    axes.set_title("validation, windows of 0.1 s")
+    axes.set_title(f"validation, windows of {WINDOW_S:g} s")
     axes.legend()
 
 
