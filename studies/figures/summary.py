@@ -54,8 +54,8 @@ def _draw_error(axes: Axes, before: RecordingComparison, after: RecordingCompari
     output = min(before.measured, key=lambda name: rmse(after, name) / rmse(before, name))
     factor = 1.0 / display_scale(output).factor
     for each, label, colour, line in (
-        (before, "before", ORANGE, "-"),
-        (after, "after", BLUE, "-"),
+        (before, "as it came", ORANGE, "-"),
+        (after, "improved", BLUE, "-"),
     ):
         error = factor * (each.measured[output] - each.simulated[WINDOW][output])
         time_s, error = thinned(each.time_s, error)
