@@ -82,7 +82,10 @@ def save_all(figures: Mapping[str, Figure], folder: Path, command: str) -> list[
 
 def save(figure: Figure, stem: Path, command: str) -> Path:
     """PDF, SVG, CSV of the curves and bars, and the command that made them; gives the SVG."""
-    dateless = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}
+    dateless = {
+        "pdf": {"CreationDate": None},
+        "svg": dict.fromkeys(("Date", "Creator", "Format", "Type")),
+    }
     with styled():
         for ending, metadata in dateless.items():
             with whole_file(stem.with_name(f"{stem.name}.{ending}")) as unfinished:
