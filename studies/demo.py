@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from workbench.diagnosis.result import Diagnosis
 
 DATA = Path(__file__).with_name("demo_data")
+MOST_WINDOWS = 24  # half of what the recording holds: without a compiler all would take minutes
 METHODS = ("pid", "lq", "mpc")
 
 Say = Callable[[str], None]
@@ -116,7 +117,7 @@ def _compare(
 
 
 def _diagnose(story: Story, rig: Rig, train: Recording, validation: Recording) -> Diagnosis:
-    found = diagnose(rig, [train], [validation], story.say)
+    found = diagnose(rig, [train], [validation], story.say, most_windows=MOST_WINDOWS)
     story.keep("diagnosis.json", diagnosis_document(found, unit_names(rig.plant.measured)))
     title = "Which effect is missing, and where it shows"
     story.tell(title, found.sentence, diagnosis_text(found, {}), diagnosis_figures(found))

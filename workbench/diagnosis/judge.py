@@ -8,7 +8,8 @@ the criterion.  A candidate is accepted when
 2. a held-out recording with frozen parameters is predicted better by more than 2 %,
 3. at least 20 % of the misfit beyond noise goes away, as the mean over training and held-out
    recordings and with no less than 10 % in training: less may stand for something else,
-4. its size is inside its bounds and more than 3 % of typical.
+4. its size is inside its bounds, more than 3 % of typical, and more than two standard deviations
+   from none.
 """
 
 from __future__ import annotations
@@ -25,9 +26,11 @@ LEAST_BIC = 4.0
 LEAST_HELD_OUT = 0.02
 LEAST_SHARE = 0.20
 LEAST_SIZE = 0.03
+DISTINCT = 2.0  # posterior standard deviations
 LARGEST_TIE = 3
 SAME_DIRECTION = 0.9  # cosine of two signatures that are one
-CLOSE_DROP = 0.20  # of the leader's drop: within it the order is not to be trusted
+CLOSE_DROP = 0.25  # of the leader's drop: within it the order is not to be trusted
+CLEARLY_LESS = 0.20  # of the held-out misfit that is left
 CLOSE_DROP_SAME = 0.50  # the same for signatures that are one
 
 HELD_OUT_REASON = "does not predict the held-out recording better"
@@ -85,6 +88,8 @@ def _size_reasons(refit: Refit) -> list[str]:
     reasons = []
     if abs(size - null) < LEAST_SIZE * abs(known.typical):
         reasons.append("its size is negligible")
+    elif abs(size - null) < DISTINCT * refit.size[name].deviation:
+        reasons.append("its size is not distinct from none")
     if abs(size - null) > 0 and size in (known.lower, known.upper) and known.upper < 1.0:
         reasons.append("its size is at a bound")
     return reasons
@@ -93,10 +98,10 @@ def _size_reasons(refit: Refit) -> list[str]:
 def tie_group(refits: list[Refit], profiles: dict[str, Profile]) -> list[Refit]:
     """The leader and those that cannot be told from it, the leader first, at most three.
 
-    A candidate is tied when its drop comes within 20 % of the best, or within 50 % with a signature
-    in the same direction: then only the nuisances decide between the two.  Among the tied the
-    held-out recording decides where it does so clearly: the one that leaves at least 20 % less of
-    the misfit there leads.
+    A candidate is tied when its drop comes within a quarter of the best, or within half of it with
+    a signature in the same direction: then only the nuisances decide between the two.  Among the tied the
+    held-out recording decides where it does so clearly: the one that leaves at least a fifth less
+    of the misfit there leads.
     """
     best = refits[0]
     tied = [best]
@@ -109,7 +114,7 @@ def tie_group(refits: list[Refit], profiles: dict[str, Profile]) -> list[Refit]:
             tied.append(other)
     tied = tied[:LARGEST_TIE]
     leader = min(tied, key=_left_held_out)
-    if not _left_held_out(leader) < (1.0 - CLOSE_DROP) * _left_held_out(best):
+    if not _left_held_out(leader) < (1.0 - CLEARLY_LESS) * _left_held_out(best):
         leader = best
     return [leader, *(each for each in tied if each is not leader)]
 

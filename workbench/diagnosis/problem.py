@@ -7,7 +7,14 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from workbench.diagnosis.scan import staged
-from workbench.fitting.gauss_newton import Fit, Linearised, fit_windows, linearise, refit_starts
+from workbench.fitting.gauss_newton import (
+    Fit,
+    Linearised,
+    fit_windows,
+    linearise,
+    refit_starts,
+    searched,
+)
 from workbench.fitting.noise import measured_noise
 from workbench.fitting.unknowns import Unknowns, nominal_unknowns
 from workbench.fitting.windows import MOST_WINDOWS, WINDOW_S, Windows, cut_windows
@@ -96,6 +103,7 @@ def pose(
     rough = fit_windows(windows, unknowns, iterations=FIRST_ITERATIONS)
     windows = windows.rescaled(rough.residual)
     base = fit_windows(windows, unknowns, rough.point, iterations=ITERATIONS)
+    base = searched(base, ITERATIONS)
     held_out = None
     if validation:
         held_out = refit_starts(_held_out(validation, base, noise, most_windows), base.plant.values)

@@ -28,6 +28,8 @@ LONGEST_STEP = 4.0  # of a scaled unknown in one step: beyond, the plant may be 
 LONGEST_START_STEP = 8.0  # of a start state, in its deviations
 DAMPINGS = (0.0, 0.1, 1.0, 10.0, 100.0)
 AGAIN = 0.02  # relative fall of the cost above which derivatives are used once more
+SEARCHES = 3
+SEARCH_MOVES = (-0.8, -0.3, 0.3, 0.8)  # of the scale of an unknown
 CONVERGED = 2e-3  # relative fall of the cost below which a fit has converged
 
 
@@ -186,6 +188,29 @@ def _moved(windows: Windows, unknowns: Unknowns, at: Linearised, point: Point) -
 def best_start(windows: Windows, unknowns: Unknowns, points: list[Point]) -> Point:
     """The point of least cost, all run in one batch."""
     return points[int(np.argmin(_costs(windows, unknowns, points)[1]))]
+
+
+def searched(fit: Fit, iterations: int) -> Fit:
+    """A fit that also looks along each unknown alone, and goes on from there.
+
+    Near break-aways the cost is rough: a Gauss-Newton step in all unknowns at once may find no way
+    down where a step in one of them does.
+    """
+    for _ in range(SEARCHES):
+        points = [fit.point, *_neighbours(fit)]
+        costs = _costs(fit.windows, fit.unknowns, points)[1]
+        best = int(np.argmin(costs))
+        if not costs[best] < (1.0 - CONVERGED) * fit.cost:
+            return fit
+        fit = fit_windows(fit.windows, fit.unknowns, points[best], iterations)
+    return fit
+
+
+def _neighbours(fit: Fit) -> list[Point]:
+    """Points that differ from a fit in one unknown."""
+    t = fit.point.t
+    moves = [move * unit(len(t), k) for k in range(len(t)) for move in SEARCH_MOVES]
+    return [replace(fit.point, t=fit.unknowns.clipped(t + move)) for move in moves]
 
 
 def refit_starts(
