@@ -99,9 +99,9 @@ def tie_group(refits: list[Refit], profiles: dict[str, Profile]) -> list[Refit]:
     """The leader and those that cannot be told from it, the leader first, at most three.
 
     A candidate is tied when its drop comes within a quarter of the best, or within half of it with
-    a signature in the same direction: then only the nuisances decide between the two.  Among the tied the
-    held-out recording decides where it does so clearly: the one that leaves at least a fifth less
-    of the misfit there leads.
+    a signature in the same direction: then only the nuisances decide between the two.  Among the
+    tied the held-out recording decides where it does so clearly: the one that leaves at least a
+    fifth less of the misfit there leads.
     """
     best = refits[0]
     tied = [best]
