@@ -32,17 +32,12 @@ def test_the_hidden_effect_comes_first_or_in_the_printed_tie(hidden):
 
     assert found.tied, confusion([found])
     assert len(found.diagnosis.ranking[0].tied_with) <= 2
-
-
-@pytest.mark.parametrize("hidden", ["chamber_leak", "piston_leak"])
-def test_its_size_comes_out_within_a_quarter(hidden):
-    found = diagnosed(hidden)
-    leader = found.diagnosis.ranking[0]
-    (size,) = leader.size.values()
-
-    assert leader.candidate.name == public_name(found.case)
-    assert size.value == pytest.approx(found.case.size, rel=0.25)
-    assert leader.drop_validation > 0.2
+    if hidden in ALWAYS:
+        leader = found.diagnosis.ranking[0]
+        (size,) = leader.size.values()
+        assert leader.candidate.name == public_name(found.case)
+        assert size.value == pytest.approx(found.case.size, rel=0.25)
+        assert leader.drop_validation > 0.2
 
 
 def test_where_nothing_is_hidden_no_false_name_is_given():

@@ -7,15 +7,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from workbench.diagnosis.scan import staged
-from workbench.fitting.gauss_newton import (
-    Fit,
-    Linearised,
-    fit_windows,
-    linearise,
-    refit_starts,
-    searched,
-)
+from workbench.fitting.gauss_newton import Fit, Linearised, fit_windows, linearise
 from workbench.fitting.noise import measured_noise
+from workbench.fitting.search import refit_starts, searched
 from workbench.fitting.unknowns import Unknowns, nominal_unknowns
 from workbench.fitting.windows import MOST_WINDOWS, WINDOW_S, Windows, cut_windows
 from workbench.plant import Candidate, Plant

@@ -9,7 +9,8 @@ import numpy as np
 
 from workbench.diagnosis.improve import Errors, errors_of, fitted_rig
 from workbench.diagnosis.problem import Problem, pose, split
-from workbench.fitting.gauss_newton import Fit, linearise, normal_equations, refit_starts
+from workbench.fitting.gauss_newton import Fit, linearise, normal_equations
+from workbench.fitting.search import refit_starts
 from workbench.plant import require
 from workbench.recording import Recording
 from workbench.rig import Rig

@@ -13,7 +13,6 @@ Source: diagnosis.md 1.2 and 1.4; Golub and Pereyra's separable least squares in
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,8 +27,6 @@ LONGEST_STEP = 4.0  # of a scaled unknown in one step: beyond, the plant may be 
 LONGEST_START_STEP = 8.0  # of a start state, in its deviations
 DAMPINGS = (0.0, 0.1, 1.0, 10.0, 100.0)
 AGAIN = 0.02  # relative fall of the cost above which derivatives are used once more
-SEARCHES = 3
-SEARCH_MOVES = (-0.8, -0.3, 0.3, 0.8)  # of the scale of an unknown
 CONVERGED = 2e-3  # relative fall of the cost below which a fit has converged
 
 
@@ -123,13 +120,13 @@ def fit_windows(
     ``at`` are derivatives to begin with, taken near by.
     """
     point = start or Point(unknowns.scaled(windows.plant.values), windows.start)
-    chi2, cost = (v[0] for v in _costs(windows, unknowns, [point]))
+    chi2, cost = (v[0] for v in points_cost(windows, unknowns, [point]))
     fresh, converged = False, False
     for _ in range(iterations):
         if at is None:
             at, fresh = linearise(windows, unknowns, point), True
         trials = _trials(windows, unknowns, at, point)
-        chi2s, costs = _costs(windows, unknowns, trials)
+        chi2s, costs = points_cost(windows, unknowns, trials)
         best = int(np.argmin(costs))
         fall = (cost - costs[best]) / max(cost, 1e-12)
         if fall > 0:
@@ -152,10 +149,10 @@ def borrowed(
 
     ``near`` belongs to the unknowns ``known`` on windows with the same states.
     """
-    h, t = _parameter_steps(unknowns, point.t), point.t
+    h, t = parameter_steps(unknowns, point.t), point.t
     new = [k for k, name in enumerate(unknowns.names) if name not in known.names]
-    plants = [_plant_at(windows, unknowns, t + h[k] * unit(len(t), k)) for k in new]
-    plants.append(_plant_at(windows, unknowns, t))
+    plants = [plant_at(windows, unknowns, t + h[k] * unit(len(t), k)) for k in new]
+    plants.append(plant_at(windows, unknowns, t))
     r = windows.residuals(plants, point.starts).transpose(0, 2, 1, 3)
     r = r.reshape(len(plants), len(windows), -1)
     J = np.zeros((*near.residual.shape, len(unknowns)))
@@ -179,7 +176,7 @@ def _trials(windows: Windows, unknowns: Unknowns, at: Linearised, point: Point) 
 
 def _moved(windows: Windows, unknowns: Unknowns, at: Linearised, point: Point) -> Linearised:
     """The same derivatives with the residual of another point."""
-    r = windows.residuals([_plant_at(windows, unknowns, point.t)], point.starts)[0]
+    r = windows.residuals([plant_at(windows, unknowns, point.t)], point.starts)[0]
     away = ((point.starts - windows.start) / windows.start_deviation).T
     rows = r.transpose(1, 0, 2).reshape(len(windows), -1)
     return replace(at, point=point, residual=np.concatenate([rows, away], axis=1))
@@ -187,52 +184,21 @@ def _moved(windows: Windows, unknowns: Unknowns, at: Linearised, point: Point) -
 
 def best_start(windows: Windows, unknowns: Unknowns, points: list[Point]) -> Point:
     """The point of least cost, all run in one batch."""
-    return points[int(np.argmin(_costs(windows, unknowns, points)[1]))]
-
-
-def searched(fit: Fit, iterations: int) -> Fit:
-    """A fit that also looks along each unknown alone, and goes on from there.
-
-    Near break-aways the cost is rough: a Gauss-Newton step in all unknowns at once may find no way
-    down where a step in one of them does.
-    """
-    for _ in range(SEARCHES):
-        points = [fit.point, *_neighbours(fit)]
-        costs = _costs(fit.windows, fit.unknowns, points)[1]
-        best = int(np.argmin(costs))
-        if not costs[best] < (1.0 - CONVERGED) * fit.cost:
-            return fit
-        fit = fit_windows(fit.windows, fit.unknowns, points[best], iterations)
-    return fit
-
-
-def _neighbours(fit: Fit) -> list[Point]:
-    """Points that differ from a fit in one unknown."""
-    t = fit.point.t
-    moves = [move * unit(len(t), k) for k in range(len(t)) for move in SEARCH_MOVES]
-    return [replace(fit.point, t=fit.unknowns.clipped(t + move)) for move in moves]
-
-
-def refit_starts(
-    windows: Windows, values: Mapping[str, float] | None = None, iterations: int = 8
-) -> Fit:
-    """Only the start states move: how well a plant with given values predicts a recording."""
-    nothing = Unknowns((), *(np.zeros(0) for _ in range(5)), held=values or {})
-    return fit_windows(windows, nothing, iterations=iterations)
+    return points[int(np.argmin(points_cost(windows, unknowns, points)[1]))]
 
 
 def linearise(windows: Windows, unknowns: Unknowns, point: Point) -> Linearised:
     """Residuals and derivatives by one batch of simulations; see :class:`Linearised`."""
     n_x, n_p = windows.start.shape[0], len(unknowns)
     h_x = START_STEP * windows.start_deviation
-    plants = [_plant_at(windows, unknowns, point.t)] * (1 + n_x)
+    plants = [plant_at(windows, unknowns, point.t)] * (1 + n_x)
     starts = [point.starts] * (1 + n_x + n_p)
     for k in range(n_x):
         moved = point.starts.copy()
         moved[k] += h_x[k]
         starts[1 + k] = moved
-    h_p = _parameter_steps(unknowns, point.t)
-    plants += [_plant_at(windows, unknowns, point.t + h_p[k] * unit(n_p, k)) for k in range(n_p)]
+    h_p = parameter_steps(unknowns, point.t)
+    plants += [plant_at(windows, unknowns, point.t + h_p[k] * unit(n_p, k)) for k in range(n_p)]
     r = windows.residuals(plants, np.array(starts)).transpose(0, 2, 1, 3)
     n = len(windows)
     r = r.reshape(len(plants), n, -1)
@@ -309,11 +275,11 @@ def _damped_steps(at: Linearised, unknowns: Unknowns) -> list[tuple[np.ndarray, 
     return steps
 
 
-def _costs(
+def points_cost(
     windows: Windows, unknowns: Unknowns, points: list[Point]
 ) -> tuple[np.ndarray, np.ndarray]:
     """(chi2, cost with priors) of each point, shapes (n,)."""
-    plants = [_plant_at(windows, unknowns, point.t) for point in points]
+    plants = [plant_at(windows, unknowns, point.t) for point in points]
     r = windows.residuals(plants, np.array([point.starts for point in points]))
     chi2 = np.sum(r**2, axis=(1, 2, 3))
     away = np.array([(q.starts - windows.start) / windows.start_deviation for q in points])
@@ -321,11 +287,11 @@ def _costs(
     return chi2, chi2 + prior + np.sum(away**2, axis=(1, 2))
 
 
-def _plant_at(windows: Windows, unknowns: Unknowns, t: np.ndarray) -> Plant:
+def plant_at(windows: Windows, unknowns: Unknowns, t: np.ndarray) -> Plant:
     return windows.plant.with_values(unknowns.values(t))
 
 
-def _parameter_steps(unknowns: Unknowns, t: np.ndarray) -> np.ndarray:
+def parameter_steps(unknowns: Unknowns, t: np.ndarray) -> np.ndarray:
     """Steps of the scaled unknowns, turned round where they would leave the bounds."""
     room = (unknowns.upper - unknowns.prior) / unknowns.scale - t
     return np.where(room > PARAMETER_STEP, PARAMETER_STEP, -PARAMETER_STEP)
