@@ -13,10 +13,10 @@ demo: $(READY)
 	@$(BIN)/workbench demo
 
 test: lint
-	@$(BIN)/python -m pytest -n 2 -q
+	@$(BIN)/python -m pytest -n 2 --dist worksteal -q
 
 test-all: lint
-	@$(BIN)/python -m pytest -n 2 -q -m ""
+	@$(BIN)/python -m pytest -n 2 --dist worksteal -q -m ""
 
 lint: $(READY)
 	@$(BIN)/ruff check --quiet .
