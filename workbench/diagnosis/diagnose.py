@@ -9,7 +9,6 @@ Source: diagnosis.md 1.2 to 1.9.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from math import isnan
 
 from workbench.diagnosis.errors import signal_errors
 from workbench.diagnosis.judge import (
@@ -32,10 +31,10 @@ from workbench.recording import Recording
 from workbench.rig import Rig
 
 REFITTED = 5  # candidates that are followed beyond the scan at the most
-ALWAYS_REFITTED = 2
+ALWAYS_REFITTED = 3
 SHIFTS_REFITTED = 2  # parameters that leave their priors
 WORTH_A_REFIT = 0.25  # of the best drop of the scan
-CERTAIN_SHARE = 0.35  # of the misfit, mean of training and held-out: no law need be tried
+CERTAIN_SHARE = 0.5  # an accepted candidate above it needs no comparison with an empirical law
 LAW_MARGIN = 0.15  # by how much of the misfit a law must beat the catalogue
 
 Progress = Callable[[str], None]
@@ -79,9 +78,7 @@ def diagnose(
             progress(f"refit with {profile.candidate.name}")
             refits.append(refit(problem, profile))
     moved = shifts(problem)
-    worth = WORTH_A_REFIT * max((p.drop for p in profiles[:1]), default=0.0) / problem.misfit
-    leaving = [each for each in moved if each.leaves and each.drop > worth]
-    for shift in leaving[:SHIFTS_REFITTED]:
+    for shift in [each for each in moved if each.leaves][:SHIFTS_REFITTED]:
         progress(f"refit with {shift.name} free")
         refits.append(refit_shift(problem, shift))
     refits.sort(key=lambda each: (not predicts(each), -each.drop_train))
@@ -205,19 +202,13 @@ def _law(
 ) -> Law | None:
     """An empirical law, unless the catalogue explains most of the misfit already."""
     leader = ranking[0] if ranking else None
-    if leader and leader.accepted and explained(leader) >= CERTAIN_SHARE:
+    if leader and leader.accepted and leader.drop_train >= CERTAIN_SHARE:
         return None
     progress("empirical law")
     law = empirical_law(problem, balance)
     followed = [r.drop_train for r in ranking if r.fit is not None and predicts_row(r)]
     best = max(followed, default=0.0)
     return law if law and law.drop_train > best + LAW_MARGIN else None
-
-
-def explained(row: Ranked) -> float:
-    """Share of the misfit that a row removes, mean of training and held-out."""
-    known = [v for v in (row.drop_train, row.drop_validation) if not isnan(v)]
-    return sum(known) / len(known)
 
 
 def _verdict(ranking: tuple[Ranked, ...], law: Law | None, held_out: bool) -> Verdict:
