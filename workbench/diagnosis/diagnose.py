@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from workbench.diagnosis.errors import signal_errors
+from workbench.diagnosis.errors import errors_of
 from workbench.diagnosis.judge import (
     HELD_OUT_REASON,
     SHARE_REASON,
@@ -94,8 +94,8 @@ def diagnose(
         sentence=_sentence(verdict, ranking, law),
         ranking=ranking,
         where=where,
-        before=_errors(problem.base, problem.base_validation),
-        after=_errors(best.fit, best.validation) if best else {},
+        before=errors_of(problem.base, problem.base_validation),
+        after=errors_of(best.fit, best.validation) if best else {},
         law=law if verdict is Verdict.NOT_IN_CATALOGUE else None,
         warnings=warnings,
         base=problem.base,
@@ -238,8 +238,3 @@ def _sentence(verdict: Verdict, ranking: tuple[Ranked, ...], law: Law | None) ->
     if verdict is Verdict.NOT_IN_CATALOGUE and law:
         return f"nothing in the catalogue: {law.text} (empirical, not a physical effect)"
     return "nothing in the catalogue earns its place"
-
-
-def _errors(train, validation) -> dict:
-    found = {"train": signal_errors(train)}
-    return {**found, "validation": signal_errors(validation)} if validation else found

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from workbench.diagnosis.result import SignalError
 from workbench.fitting.gauss_newton import Fit
 from workbench.units import public_name
+
+Errors = Mapping[str, Mapping[str, SignalError]]
 
 
 def signal_errors(fit: Fit) -> dict[str, SignalError]:
@@ -25,3 +29,9 @@ def signal_errors(fit: Fit) -> dict[str, SignalError]:
         rmse = float(np.sqrt(np.mean(e**2)))
         found[public_name(name)] = SignalError(rmse, percent, float(windows.noise[k]))
     return found
+
+
+def errors_of(train: Fit, validation: Fit | None) -> Errors:
+    """Errors in units of a fit and of its validation."""
+    found = {"train": signal_errors(train)}
+    return {**found, "validation": signal_errors(validation)} if validation else found

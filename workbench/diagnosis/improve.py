@@ -8,14 +8,14 @@ Source: diagnosis.md 1.10 (forward selection with a new scan after each acceptan
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from workbench.diagnosis.diagnose import Progress, diagnose, silent
-from workbench.diagnosis.errors import signal_errors
+from workbench.diagnosis.errors import Errors, errors_of
 from workbench.diagnosis.problem import Problem, pose, split
 from workbench.diagnosis.refit import posterior_deviation, refit
-from workbench.diagnosis.result import Diagnosis, SignalError
+from workbench.diagnosis.result import Diagnosis
 from workbench.diagnosis.scan import scan
 from workbench.fitting.gauss_newton import Fit
 from workbench.plant import Candidate, require
@@ -23,7 +23,6 @@ from workbench.recording import Recording
 from workbench.rig import Rig
 
 MOST_ROUNDS = 8
-Errors = Mapping[str, Mapping[str, SignalError]]
 
 
 @dataclass(frozen=True)
@@ -220,12 +219,6 @@ def _addition(
         parameters=moved_parameters(fit),
         fit=fit,
     )
-
-
-def errors_of(train: Fit, validation: Fit | None) -> Errors:
-    """Errors in units of a fit and of its validation."""
-    found = {"train": signal_errors(train)}
-    return {**found, "validation": signal_errors(validation)} if validation else found
 
 
 def moved_parameters(fit: Fit) -> tuple[Moved, ...]:

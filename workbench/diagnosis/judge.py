@@ -70,11 +70,8 @@ def _bic_gain(base: Fit, fit: Fit, parameters: int) -> float:
 def _effective_samples(fit: Fit) -> float:
     """Recorded values over the correlation times of their errors."""
     windows = fit.windows
-    noise = windows.noise[:, None]
-    plain = windows.errors.scale(windows.activity, noise, correlated=False)
-    samples = (windows.errors.scale(windows.activity, noise) / plain) ** 2
     recorded = (windows.weight > 0).sum(axis=2)
-    return float(np.sum(recorded / samples))
+    return float(np.sum(recorded / windows.correlation))
 
 
 def _size_reasons(refit: Refit) -> list[str]:

@@ -138,9 +138,13 @@ def posterior_deviation(fit: Fit) -> np.ndarray:
 
     Scales already carry the correlation time of the residuals, so no further inflation is due.
     """
+    return np.sqrt(np.maximum(np.diag(posterior_covariance(fit)), 0.0)) * fit.unknowns.scale
+
+
+def posterior_covariance(fit: Fit) -> np.ndarray:
+    """Covariance of the scaled unknowns from the curvature of the cost, shape (n_p, n_p)."""
     normal = normal_equations(linearise(fit.windows, fit.unknowns, fit.point), fit.unknowns)
-    variance = np.diag(np.linalg.inv(normal.hessian)) if len(fit.unknowns) else np.zeros(0)
-    return np.sqrt(np.maximum(variance, 0.0)) * fit.unknowns.scale
+    return np.linalg.inv(normal.hessian) if len(fit.unknowns) else np.zeros((0, 0))
 
 
 def _drop(before: Fit | None, after: Fit | None) -> float:
@@ -166,10 +170,7 @@ def _bounded(fit: Fit) -> np.ndarray:
     """Squared error of each output and window up to that of an outlying one, (n_y, n_windows)."""
     windows = fit.windows
     squares = (fit.residual**2).sum(axis=2)
-    noise = windows.noise[:, None]
-    plain = windows.errors.scale(windows.activity, noise, correlated=False)
-    samples = (windows.errors.scale(windows.activity, noise) / plain) ** 2
-    return np.minimum(squares, OUTLYING**2 * windows.length / samples)
+    return np.minimum(squares, OUTLYING**2 * windows.length / windows.correlation)
 
 
 def _distinct(trials: tuple[Trial, ...]) -> list[Trial]:

@@ -7,9 +7,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from workbench.diagnosis.improve import Errors, errors_of, fitted_rig
+from workbench.diagnosis.errors import Errors, errors_of
+from workbench.diagnosis.improve import fitted_rig
 from workbench.diagnosis.problem import Problem, pose, split
-from workbench.fitting.gauss_newton import Fit, linearise, normal_equations
+from workbench.diagnosis.refit import posterior_covariance
+from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.search import refit_starts
 from workbench.plant import require
 from workbench.recording import Recording
@@ -78,10 +80,11 @@ def fit(
     problem = pose(held, train, validation)
     before = _untouched(problem)
     base = problem.base
+    covariance = posterior_covariance(base)
     return FitReport(
         rig=fitted_rig(rig, base, ()),
-        rows=_rows(base),
-        correlations=_correlations(base),
+        rows=_rows(base, covariance),
+        correlations=_correlations(covariance),
         before=before,
         after=errors_of(base, problem.base_validation),
         converged=base.converged,
@@ -97,21 +100,14 @@ def _untouched(problem: Problem) -> Errors:
     return errors_of(train, refit_starts(held_out.windows, values) if held_out else None)
 
 
-def _covariance(fit: Fit) -> np.ndarray:
-    """Posterior covariance of the scaled unknowns, (n_p, n_p)."""
-    normal = normal_equations(linearise(fit.windows, fit.unknowns, fit.point), fit.unknowns)
-    return np.linalg.inv(normal.hessian)
-
-
-def _correlations(fit: Fit) -> np.ndarray:
-    covariance = _covariance(fit)
+def _correlations(covariance: np.ndarray) -> np.ndarray:
     deviation = np.sqrt(np.diag(covariance))
     return covariance / np.outer(deviation, deviation)
 
 
-def _rows(fit: Fit) -> tuple[FittedParameter, ...]:
+def _rows(fit: Fit, covariance: np.ndarray) -> tuple[FittedParameter, ...]:
     unknowns, values = fit.unknowns, fit.plant.values
-    deviation = np.sqrt(np.diag(_covariance(fit)))
+    deviation = np.sqrt(np.diag(covariance))
     rows = []
     for k, name in enumerate(unknowns.names):
         room = min(values[name] - unknowns.lower[k], unknowns.upper[k] - values[name])

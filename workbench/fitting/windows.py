@@ -76,6 +76,13 @@ class Windows:
         return np.where(np.isnan(self.measured), 0.0, 1.0 / self.scale[:, :, None])
 
     @property
+    def correlation(self) -> np.ndarray:
+        """Samples over which errors are correlated, shape (n_y, n_windows)."""
+        noise = self.noise[:, None]
+        plain = self.errors.scale(self.activity, noise, correlated=False)
+        return (self.errors.scale(self.activity, noise) / plain) ** 2
+
+    @property
     def floor(self) -> float:
         """What sensor noise alone adds to the sum of squared weighted residuals."""
         return float(np.sum((self.weight * self.noise[:, None, None]) ** 2))
