@@ -101,7 +101,7 @@ class Body(Part):
         if position_m is None:
             return {}
         velocity_m_s = seen[f"{self.name}.velocity_m_s"]
-        return {"position_m": (position_m, 1e-3), "velocity_m_s": (velocity_m_s, 1e-2)}
+        return {"position_m": (position_m, 2e-5), "velocity_m_s": (velocity_m_s, 1e-2)}
 
     def rates(self, now: Conditions, received: Received) -> dict[str, Expression]:
         got = received(self.name)
@@ -202,7 +202,7 @@ class Chamber(Part):
             return {}
         filled_kg = self.filled_mass_kg(pressure_pa, position_m)
         return {
-            "pressure_pa": (pressure_pa, 1e4),
+            "pressure_pa": (pressure_pa, 2e3),
             "mass_kg": (filled_kg, 0.05 * float(np.median(filled_kg))),
         }
 

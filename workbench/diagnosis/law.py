@@ -93,7 +93,7 @@ def _next_term(problem: Problem, accepted: list[Candidate]) -> Refit | None:
         for c in problem.whole.candidates.values()
         if c.cause.name.startswith("law[") and c not in accepted
     ]
-    profiles = scan(problem.whole, at.windows, at.unknowns, at.point, left)
+    profiles = scan(problem.whole, at.windows, at.unknowns, at.point, left, at.derivatives)
     return refit(problem, profiles[0]) if profiles and profiles[0].drop > 0 else None
 
 

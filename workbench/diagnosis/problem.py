@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 from workbench.diagnosis.scan import staged
-from workbench.fitting.gauss_newton import Fit, Linearised, fit_windows, linearise
+from workbench.fitting.gauss_newton import Fit, Linearised, fit_windows
 from workbench.fitting.noise import measured_noise
 from workbench.fitting.search import refit_starts, searched
 from workbench.fitting.unknowns import Unknowns, nominal_unknowns
@@ -55,12 +55,12 @@ class Problem:
         windows = self.base_validation.windows
         if fit.windows.plant is not windows.plant:
             windows = windows.with_plant(fit.windows.plant)
-        return refit_starts(windows, fit.plant.values)
+        return refit_starts(windows, fit.plant.values, self.base_validation)
 
-    @cached_property
+    @property
     def linearised(self) -> Linearised:
         """Residuals and derivatives at the base, for scan, shifts and refits."""
-        return linearise(self.base.windows, self.base.unknowns, self.base.point)
+        return self.base.derivatives
 
     @property
     def misfit(self) -> float:
@@ -97,7 +97,8 @@ def pose(
     rough = fit_windows(windows, unknowns, iterations=FIRST_ITERATIONS)
     windows = windows.rescaled(rough.residual)
     base = fit_windows(windows, unknowns, rough.point, iterations=ITERATIONS)
-    base = searched(base, ITERATIONS)
+    if os.environ.get("SEARCH"):
+        base = searched(base, ITERATIONS)
     held_out = None
     if validation:
         held_out = refit_starts(_held_out(validation, base, noise, most_windows), base.plant.values)

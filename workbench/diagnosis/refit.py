@@ -23,15 +23,16 @@ from workbench.fitting.gauss_newton import (
     best_start,
     borrowed,
     fit_windows,
-    linearise,
     normal_equations,
 )
+from workbench.fitting.search import carried
 from workbench.fitting.unknowns import WIDE, Unknowns
 from workbench.fitting.windows import Windows
 from workbench.plant import Candidate
 
-STARTS = 2  # sizes of the scan that are followed
-TRIED = 3  # iterations of each before the best is chosen
+STARTS = 2  # sizes of the scan that are tried
+SHARES = (1.0, 0.5, 0.0)  # of the linear step of the nuisances that goes with each
+FIRST_ITERATIONS = 4  # before other strengths are probed
 ITERATIONS = 5
 PROBES = (0.4, 0.6, 0.8, 0.9, 1.15, 1.4, 1.8, 2.5)  # factors on a fitted strength
 
@@ -59,17 +60,11 @@ def refit(problem: Problem, profile: Profile) -> Refit:
         needed = [c.member for c in problem.added] + [candidate.member]
         windows = windows.with_plant(staged(problem.whole, *needed))
     unknowns = problem.unknowns(windows.plant, candidate)
-    tried = []
-    for trial in _distinct(profile.trials):
-        starts = [_start(problem, windows, unknowns, trial, share) for share in (1.0, 0.5, 0.0)]
-        start = best_start(windows, unknowns, starts)
-        at = _nearby(problem, windows, unknowns, start)
-        tried.append(fit_windows(windows, unknowns, start, TRIED, at))
-    best = min(tried, key=lambda each: each.cost)
-    fit = best if best.converged else fit_windows(windows, unknowns, best.point, ITERATIONS)
+    start = best_start(windows, unknowns, _starts(problem, windows, unknowns, profile))
+    at = _nearby(problem, windows, unknowns, start)
+    fit = fit_windows(windows, unknowns, start, FIRST_ITERATIONS, at)
     probed = best_start(windows, unknowns, _probes(fit, candidate.strength))
-    if probed is not fit.point:
-        fit = fit_windows(windows, unknowns, probed, ITERATIONS)
+    fit = fit_windows(windows, unknowns, probed, ITERATIONS)
     validation = problem.validated(fit)
     return Refit(
         candidate=candidate,
@@ -143,7 +138,7 @@ def posterior_deviation(fit: Fit) -> np.ndarray:
 
 def posterior_covariance(fit: Fit) -> np.ndarray:
     """Covariance of the scaled unknowns from the curvature of the cost, shape (n_p, n_p)."""
-    normal = normal_equations(linearise(fit.windows, fit.unknowns, fit.point), fit.unknowns)
+    normal = normal_equations(fit.derivatives, fit.unknowns)
     return np.linalg.inv(normal.hessian) if len(fit.unknowns) else np.zeros((0, 0))
 
 
@@ -182,15 +177,20 @@ def _distinct(trials: tuple[Trial, ...]) -> list[Trial]:
     return chosen
 
 
-def _start(
-    problem: Problem, windows: Windows, unknowns: Unknowns, trial: Trial, share: float
-) -> Point:
-    """Base values moved by a share of a trial's linear step, the candidate at its size."""
+def _starts(
+    problem: Problem, windows: Windows, unknowns: Unknowns, profile: Profile
+) -> list[Point]:
+    """The best trials with more and less of their linear step, and the base as it is.
+
+    The last one makes sure that no refit ends worse than what it was added to.
+    """
     base = problem.base
-    moved = base.unknowns.clipped(base.point.t + share * trial.nuisance)
-    values = {**windows.plant.values, **base.unknowns.values(moved), **trial.values}
-    starts = windows.start.copy()
-    names = list(windows.plant.state_list)
-    for row, name in enumerate(base.windows.plant.state_list):
-        starts[names.index(name)] = base.point.starts[row]
-    return Point(unknowns.clipped(unknowns.scaled(values)), starts)
+    starts = carried(base, windows)
+    points = []
+    for trial in _distinct(profile.trials):
+        for share in SHARES:
+            moved_t = base.unknowns.clipped(base.point.t + share * trial.nuisance)
+            values = {**windows.plant.values, **base.unknowns.values(moved_t), **trial.values}
+            points.append(Point(unknowns.clipped(unknowns.scaled(values)), starts))
+    values = {**windows.plant.values, **base.plant.values}
+    return [*points, Point(unknowns.clipped(unknowns.scaled(values)), starts)]

@@ -13,7 +13,7 @@ Source: diagnosis.md 1.2 and 1.4; Golub and Pereyra's separable least squares in
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -86,6 +86,8 @@ class Fit:
         The same with the priors of parameters and start states.
     converged
         False where the last step still brought more than 0.2 %.
+    derivatives
+        Those that the last step used, with the residual of where the fit ended.
     """
 
     windows: Windows
@@ -94,6 +96,7 @@ class Fit:
     chi2: float
     cost: float
     converged: bool
+    derivatives: Linearised = field(repr=False)
 
     @property
     def plant(self) -> Plant:
@@ -121,9 +124,9 @@ def fit_windows(
     """
     point = start or Point(unknowns.scaled(windows.plant.values), windows.start)
     chi2, cost = (v[0] for v in points_cost(windows, unknowns, [point]))
-    fresh, converged = False, False
+    fresh, converged, stale = False, False, at is None
     for _ in range(iterations):
-        if at is None:
+        if stale or at is None:
             at, fresh = linearise(windows, unknowns, point), True
         trials = _trials(windows, unknowns, at, point)
         chi2s, costs = points_cost(windows, unknowns, trials)
@@ -134,12 +137,11 @@ def fit_windows(
         converged = fall < CONVERGED
         if converged and fresh:
             break
-        stale = fall < AGAIN
+        stale, fresh = fall < AGAIN, False
         if not stale:
-            at, fresh = _moved(windows, unknowns, at, point), False
-        else:
-            at = None
-    return Fit(windows, unknowns, point, float(chi2), float(cost), converged)
+            at = moved(windows, unknowns, at, point)
+    at = moved(windows, unknowns, at, point) if at else linearise(windows, unknowns, point)
+    return Fit(windows, unknowns, point, float(chi2), float(cost), converged, at)
 
 
 def borrowed(
@@ -174,8 +176,11 @@ def _trials(windows: Windows, unknowns: Unknowns, at: Linearised, point: Point) 
     ]
 
 
-def _moved(windows: Windows, unknowns: Unknowns, at: Linearised, point: Point) -> Linearised:
-    """The same derivatives with the residual of another point."""
+def moved(windows: Windows, unknowns: Unknowns, at: Linearised, point: Point) -> Linearised:
+    """The same derivatives with the residual of another point.
+
+    ``at`` may belong to other values of the same unknowns, or to a plant with other values.
+    """
     r = windows.residuals([plant_at(windows, unknowns, point.t)], point.starts)[0]
     away = ((point.starts - windows.start) / windows.start_deviation).T
     rows = r.transpose(1, 0, 2).reshape(len(windows), -1)

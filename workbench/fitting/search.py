@@ -7,7 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from workbench.fitting.gauss_newton import CONVERGED, Fit, Point, fit_windows, points_cost, unit
+from workbench.fitting.gauss_newton import (
+    CONVERGED,
+    Fit,
+    Point,
+    fit_windows,
+    moved,
+    points_cost,
+    unit,
+)
 from workbench.fitting.unknowns import Unknowns
 from workbench.fitting.windows import Windows
 
@@ -39,8 +47,29 @@ def _neighbours(fit: Fit) -> list[Point]:
 
 
 def refit_starts(
-    windows: Windows, values: Mapping[str, float] | None = None, iterations: int = 8
+    windows: Windows,
+    values: Mapping[str, float] | None = None,
+    near: Fit | None = None,
+    iterations: int = 8,
 ) -> Fit:
-    """Only the start states move: how well a plant with given values predicts a recording."""
+    """Only the start states move: how well a plant with given values predicts a recording.
+
+    ``near`` is a fit of a plant with fewer effects, or other values, on the same windows: where
+    to begin.
+    """
     nothing = Unknowns((), *(np.zeros(0) for _ in range(5)), held=values or {})
-    return fit_windows(windows, nothing, iterations=iterations)
+    start, at = None, None
+    if near is not None:
+        start = Point(np.zeros(0), carried(near, windows))
+        at = near.derivatives if near.windows.plant is windows.plant else None
+        at = moved(windows, nothing, at, start) if at else None
+    return fit_windows(windows, nothing, start, iterations, at)
+
+
+def carried(near: Fit, windows: Windows) -> np.ndarray:
+    """Start states of a fit for windows of a plant with more states, shape (n_x, n_windows)."""
+    starts = windows.start.copy()
+    names = list(windows.plant.state_list)
+    for row, name in enumerate(near.windows.plant.state_list):
+        starts[names.index(name)] = near.point.starts[row]
+    return starts

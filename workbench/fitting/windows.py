@@ -20,6 +20,7 @@ import numpy as np
 from workbench.effect import Effect
 from workbench.fitting.error_model import OUTLYING, ErrorModel, error_model
 from workbench.fitting.starts import guessed_states
+from workbench.model import Model
 from workbench.plant import Plant
 from workbench.recording import Recording
 from workbench.simulation import inputs
@@ -54,6 +55,7 @@ class Windows:
         The error model that gave the scales.
     start, start_deviation
         Start states guessed from the recording and their standard deviations (n_x, n_windows).
+        They are what the sensors show: a sensor that reads too much shifts the start with it.
     """
 
     plant: Plant
@@ -124,7 +126,7 @@ class Windows:
 
     def with_plant(self, plant: Plant) -> Windows:
         """The same windows for a plant with other effects; states it shares keep their start."""
-        start, deviation = _starts(plant, self.recordings, self.firsts)
+        start, deviation = _starts(plant, self.recordings, self.firsts, self.noise)
         ours, theirs = list(plant.state_list), list(self.plant.state_list)
         for row, name in enumerate(ours):
             if name in theirs:
@@ -201,8 +203,8 @@ def cut_windows(
         ],
         axis=1,
     )
-    start, deviation = _starts(plant, recordings, firsts)
     sigma = np.array([noise[name] for name in plant.measured])
+    start, deviation = _starts(plant, recordings, firsts, sigma)
     scale = np.tile(sigma[:, None], (1, measured.shape[1]))
     one = np.ones((len(sigma), 1))
     errors = ErrorModel(sigma[:, None], 0.0 * one, one, one)
@@ -212,21 +214,37 @@ def cut_windows(
 
 
 def window_run(plant: Plant, sample_time_s: float, length: int) -> ca.Function:
-    """(x0, u, d, p) -> outputs over one window; u, d of L columns, result (n_y, L)."""
+    """(x0, u, d, p) -> outputs over one window; u, d of L columns, result (n_y, L).
+
+    ``x0`` is the start as the sensors show it; see :class:`Windows`.
+    """
     model = plant.model
     x0, u, d, p = (
         ca.MX.sym(name, symbol.numel(), columns)
         for name, symbol, columns in zip("xudp", model.symbols, (1, length, length, 1), strict=True)
     )
-    x = x0
+    x = _behind_sensors(model, x0, u[:, 0], d[:, 0], p)
     if model.states:
         later = model.compiled_step(sample_time_s).mapaccum(length - 1)
         columns = ca.repmat(p, 1, length - 1)
-        x = ca.horzcat(x0, later(x0, u[:, :-1], d[:, :-1], columns))
+        x = ca.horzcat(x, later(x, u[:, :-1], d[:, :-1], columns))
     else:
         x = ca.MX(0, length)
     y = model.h.map(length)(x, u, d, ca.repmat(p, 1, length))
     return ca.Function("window", [x0, u, d, p], [y])
+
+
+def _behind_sensors(model: Model, seen: ca.MX, u: ca.MX, d: ca.MX, p: ca.MX) -> ca.MX:
+    """The states behind those that sensors show: x - (y - x) where a state x is measured as y."""
+    distorted = model.h(seen, u, d, p)
+    rows = {name: k for k, name in enumerate(model.measured)}
+    return ca.vertcat(
+        ca.MX(0, 1),
+        *(
+            2.0 * seen[k] - distorted[rows[name]] if name in rows else seen[k]
+            for k, name in enumerate(model.states)
+        ),
+    )
 
 
 def _thinned(firsts: tuple[tuple[int, ...], ...], most: int) -> tuple[tuple[int, ...], ...]:
@@ -275,12 +293,23 @@ def _cut_inputs(
 
 
 def _starts(
-    plant: Plant, recordings: tuple[Recording, ...], firsts: tuple[tuple[int, ...], ...]
+    plant: Plant,
+    recordings: tuple[Recording, ...],
+    firsts: tuple[tuple[int, ...], ...],
+    noise: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Start states and their standard deviations, shapes (n_x, n_windows)."""
+    """Start states and their standard deviations, shapes (n_x, n_windows).
+
+    The guess of a state that is recorded is no better than the noise ``noise``, shape (n_y,).
+    """
     columns = [
         guessed_states(plant, recording)[:, :, list(own)]
         for recording, own in zip(recordings, firsts, strict=True)
     ]
-    both = np.concatenate(columns, axis=2)
-    return both[0], both[1]
+    guess, deviation = np.concatenate(columns, axis=2)
+    states = list(plant.state_list)
+    for name, sigma in zip(plant.measured, noise, strict=True):
+        if name in states:
+            row = states.index(name)
+            deviation[row] = np.hypot(deviation[row], sigma)
+    return guess, deviation
