@@ -5,7 +5,7 @@ import pytest
 
 from workbench.fitting.gauss_newton import fit_windows
 from workbench.fitting.noise import measured_noise
-from workbench.fitting.search import refit_starts
+from workbench.fitting.start_states import refit_starts
 from workbench.fitting.unknowns import Unknowns, nominal_unknowns
 from workbench.fitting.windows import cut_windows
 from workbench.plants import servo_drive

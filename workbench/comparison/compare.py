@@ -21,7 +21,7 @@ from workbench.comparison.regimes import regimes, shares
 from workbench.diagnosis.result import SignalError
 from workbench.filtering import filter_pass
 from workbench.fitting.noise import measured_noise
-from workbench.fitting.search import refit_starts
+from workbench.fitting.start_states import refit_starts
 from workbench.fitting.starts import guessed_states
 from workbench.fitting.windows import WINDOW_S, Windows, cut_windows
 from workbench.plant import Plant

@@ -9,6 +9,7 @@ Source: diagnosis.md 1.2 to 1.9.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 from workbench.diagnosis.errors import errors_of
 from workbench.diagnosis.judge import (
@@ -19,7 +20,7 @@ from workbench.diagnosis.judge import (
     tie_group,
 )
 from workbench.diagnosis.law import empirical_law
-from workbench.diagnosis.problem import Problem, pose, split
+from workbench.diagnosis.problem import Problem, improved_base, pose, split
 from workbench.diagnosis.refit import Refit, refit, refit_shift
 from workbench.diagnosis.result import DecidedBy, Diagnosis, Law, Ranked, Verdict
 from workbench.diagnosis.scan import Profile, scan
@@ -70,18 +71,13 @@ def diagnose(
     problem = pose(rig, train, validation, most_windows)
     if not problem.base.converged:
         warnings += ("the prior fit did not converge: the ranking is provisional",)
-    progress("scan of the catalogue")
-    profiles = _scanned(problem)
-    refits = []
-    for rank, profile in enumerate(profiles[:REFITTED]):
-        if rank < ALWAYS_REFITTED or profile.drop > WORTH_A_REFIT * profiles[0].drop:
-            progress(f"refit with {profile.candidate.name}")
-            refits.append(refit(problem, profile))
-    moved = shifts(problem)
-    for shift in [each for each in moved if each.leaves][:SHIFTS_REFITTED]:
-        progress(f"refit with {shift.name} free")
-        refits.append(refit_shift(problem, shift))
-    refits.sort(key=lambda each: (not predicts(each), -each.drop_train))
+    found = _followed(problem, progress)
+    better = improved_base(problem, [each.fit for each in found.refits])
+    if better:
+        progress("the prior fit is improved by what the refits found: once more")
+        problem = better
+        found = _followed(problem, progress)
+    profiles, refits, moved = found.profiles, found.refits, found.moved
     ranking = _ranking(problem, profiles, refits, moved)
     progress("where it fails")
     where = locate(problem, train)
@@ -101,6 +97,32 @@ def diagnose(
         base=problem.base,
         base_validation=problem.base_validation,
     )
+
+
+@dataclass(frozen=True)
+class _Followed:
+    """Scan, refits (best first), and shifts of fitted parameters."""
+
+    profiles: list[Profile]
+    refits: list[Refit]
+    moved: list[Shift]
+
+
+def _followed(problem: Problem, progress: Progress) -> _Followed:
+    """Scan the catalogue and refit the best few."""
+    progress("scan of the catalogue")
+    profiles = _scanned(problem)
+    refits = []
+    for rank, profile in enumerate(profiles[:REFITTED]):
+        if rank < ALWAYS_REFITTED or profile.drop > WORTH_A_REFIT * profiles[0].drop:
+            progress(f"refit with {profile.candidate.name}")
+            refits.append(refit(problem, profile))
+    moved = shifts(problem)
+    for shift in [each for each in moved if each.leaves][:SHIFTS_REFITTED]:
+        progress(f"refit with {shift.name} free")
+        refits.append(refit_shift(problem, shift))
+    refits.sort(key=lambda each: (not predicts(each), -each.drop_train))
+    return _Followed(profiles, refits, moved)
 
 
 def _scanned(problem: Problem) -> list[Profile]:
@@ -200,9 +222,13 @@ def _scanned_row(problem: Problem, profile: Profile) -> Ranked:
 def _law(
     problem: Problem, ranking: tuple[Ranked, ...], balance: str | None, progress: Progress
 ) -> Law | None:
-    """An empirical law, unless the catalogue explains most of the misfit already."""
+    """An empirical law, unless an effect of the catalogue explains most of the misfit already.
+
+    A parameter that leaves its prior is no such effect: it may well imitate the law.
+    """
     leader = ranking[0] if ranking else None
-    if leader and leader.accepted and leader.drop_train >= CERTAIN_SHARE:
+    certain = leader and leader.accepted and leader.kind is Kind.EFFECT
+    if leader and certain and leader.drop_train >= CERTAIN_SHARE:
         return None
     progress("empirical law")
     law = empirical_law(problem, balance)

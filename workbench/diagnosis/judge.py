@@ -64,7 +64,7 @@ def _share(refit: Refit) -> float:
 def _bic_gain(base: Fit, fit: Fit, parameters: int) -> float:
     effective = max(float(_effective_samples(base)), 2.0)
     spread = max(fit.chi2 / effective, 1e-12)
-    return (base.chi2 - fit.chi2) / spread - parameters * log(effective)
+    return (base.cost - fit.cost) / spread - parameters * log(effective)
 
 
 def _effective_samples(fit: Fit) -> float:

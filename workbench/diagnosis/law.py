@@ -99,9 +99,9 @@ def _next_term(problem: Problem, accepted: list[Candidate]) -> Refit | None:
 
 def _counted_from(first: Problem, found: Refit) -> Refit:
     """The same refit with its drops counted from the problem before any term."""
-    train = (first.base.chi2 - found.fit.chi2) / misfit(first.base)
+    train = (first.base.cost - found.fit.cost) / misfit(first.base)
     before, after = first.base_validation, found.validation
-    held_out = (before.chi2 - after.chi2) / misfit(before) if before and after else float("nan")
+    held_out = (before.cost - after.cost) / misfit(before) if before and after else float("nan")
     return replace(found, drop_train=train, drop_validation=held_out)
 
 

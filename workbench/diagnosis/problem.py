@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from workbench.diagnosis.scan import staged
-from workbench.fitting.gauss_newton import Fit, Linearised, fit_windows
+from workbench.fitting.gauss_newton import Fit, Linearised, Point, fit_windows, points_costs
 from workbench.fitting.noise import measured_noise
-from workbench.fitting.search import refit_starts, searched
+from workbench.fitting.start_states import refit_starts
 from workbench.fitting.unknowns import Unknowns, nominal_unknowns
 from workbench.fitting.windows import MOST_WINDOWS, WINDOW_S, Windows, cut_windows
 from workbench.plant import Candidate, Plant
@@ -19,6 +18,7 @@ from workbench.rig import Rig
 LONGEST_WINDOW_S = 0.4
 FIRST_ITERATIONS = 3  # with scales from the model as it came
 ITERATIONS = 12  # with scales from the first fit
+LEAST_IMPROVEMENT = 0.03  # of the misfit, for a prior fit to be taken up again
 
 
 @dataclass(frozen=True)
@@ -64,13 +64,41 @@ class Problem:
 
     @property
     def misfit(self) -> float:
-        """Squared error of the base beyond sensor noise."""
+        """Squared error of the base beyond sensor noise; see :func:`misfit`."""
         return misfit(self.base)
 
 
 def misfit(fit: Fit) -> float:
-    """Sum of squared weighted residuals beyond what sensor noise adds, at least 1."""
-    return max(fit.chi2 - fit.windows.floor, 1.0)
+    """Squared error beyond what sensor noise adds, with the price of the priors, at least 1.
+
+    The price counts: a fit that reaches the same error with a heat flow five deviations off its
+    prior has explained less than one that stays near it.
+    """
+    return max(fit.cost - fit.windows.floor, 1.0)
+
+
+def improved_base(problem: Problem, fits: Sequence[Fit]) -> Problem | None:
+    """The problem with a better prior fit, where the refits found its parameters; else None.
+
+    A refit whose nominal parameters alone, with its effect taken away again, are better than the
+    base has found a place that the prior fit missed; its effect would get the credit for that.
+    """
+    base = problem.base
+    points = []
+    for fit in fits:
+        values = {**base.windows.plant.values, **fit.plant.values}
+        states = list(fit.windows.plant.state_list)
+        rows = [states.index(name) for name in base.windows.plant.state_list]
+        t = base.unknowns.clipped(base.unknowns.scaled(values))
+        points.append(Point(t, fit.point.starts[rows]))
+    best = points_costs(base.windows, base.unknowns, points).best if points else None
+    if not best or base.cost - best.cost < LEAST_IMPROVEMENT * problem.misfit:
+        return None
+    better = fit_windows(base.windows, base.unknowns, best.point, ITERATIONS)
+    held_out = problem.base_validation
+    if held_out:
+        held_out = refit_starts(held_out.windows, better.plant.values, held_out)
+    return replace(problem, base=better, base_validation=held_out)
 
 
 def pose(
@@ -97,8 +125,6 @@ def pose(
     rough = fit_windows(windows, unknowns, iterations=FIRST_ITERATIONS)
     windows = windows.rescaled(rough.residual)
     base = fit_windows(windows, unknowns, rough.point, iterations=ITERATIONS)
-    if os.environ.get("SEARCH"):
-        base = searched(base, ITERATIONS)
     held_out = None
     if validation:
         held_out = refit_starts(_held_out(validation, base, noise, most_windows), base.plant.values)

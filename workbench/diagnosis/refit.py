@@ -25,7 +25,7 @@ from workbench.fitting.gauss_newton import (
     fit_windows,
     normal_equations,
 )
-from workbench.fitting.search import carried
+from workbench.fitting.start_states import carried
 from workbench.fitting.unknowns import WIDE, Unknowns
 from workbench.fitting.windows import Windows
 from workbench.plant import Candidate
@@ -60,11 +60,18 @@ def refit(problem: Problem, profile: Profile) -> Refit:
         needed = [c.member for c in problem.added] + [candidate.member]
         windows = windows.with_plant(staged(problem.whole, *needed))
     unknowns = problem.unknowns(windows.plant, candidate)
-    start = best_start(windows, unknowns, _starts(problem, windows, unknowns, profile))
-    at = _nearby(problem, windows, unknowns, start)
-    fit = fit_windows(windows, unknowns, start, FIRST_ITERATIONS, at)
-    probed = best_start(windows, unknowns, _probes(fit, candidate.strength))
+    tried = []
+    for points in _starts(problem, windows, unknowns, profile):
+        start = best_start(windows, unknowns, points)
+        at = _nearby(problem, windows, unknowns, start)
+        tried.append(fit_windows(windows, unknowns, start, FIRST_ITERATIONS, at))
+    rough = min(tried, key=lambda each: each.cost)
+    probed = best_start(windows, unknowns, _probes(rough, (candidate.strength, *candidate.forms)))
     fit = fit_windows(windows, unknowns, probed, ITERATIONS)
+    if fit.cost > problem.base.cost:  # a poor start: go on from the base, where it is absent
+        values = {**windows.plant.values, **problem.base.plant.values}
+        absent = Point(unknowns.clipped(unknowns.scaled(values)), carried(problem.base, windows))
+        fit = fit_windows(windows, unknowns, absent, ITERATIONS)
     validation = problem.validated(fit)
     return Refit(
         candidate=candidate,
@@ -104,19 +111,19 @@ def refit_shift(problem: Problem, shift: Shift) -> Refit:
     )
 
 
-def _probes(fit: Fit, name: str) -> list[Point]:
-    """The point of a fit and others with another strength: a way out where derivatives mislead.
+def _probes(fit: Fit, names: tuple[str, ...]) -> list[Point]:
+    """The point of a fit and others with another strength or form: a way out of rough places.
 
     Near break-aways the cost is rough, and a Gauss-Newton step in all unknowns at once may find no
     way down where a step in the strength alone does.
     """
-    row = fit.unknowns.names.index(name)
-    at = fit.unknowns.prior[row] / fit.unknowns.scale[row] + fit.point.t[row]
     probes = [fit.point]
-    for factor in PROBES:
-        t = fit.point.t.copy()
-        t[row] += (factor - 1.0) * at
-        probes.append(replace(fit.point, t=fit.unknowns.clipped(t)))
+    for row in (fit.unknowns.names.index(name) for name in names if name in fit.unknowns.names):
+        at = fit.unknowns.prior[row] / fit.unknowns.scale[row] + fit.point.t[row]
+        for factor in PROBES:
+            t = fit.point.t.copy()
+            t[row] += (factor - 1.0) * at
+            probes.append(replace(fit.point, t=fit.unknowns.clipped(t)))
     return probes
 
 
@@ -146,7 +153,7 @@ def _drop(before: Fit | None, after: Fit | None) -> float:
     """Share of the misfit beyond noise that went away, NaN without both."""
     if before is None or after is None:
         return float("nan")
-    return (before.chi2 - after.chi2) / misfit(before)
+    return (before.cost - after.cost) / misfit(before)
 
 
 def held_out_drop(before: Fit | None, after: Fit | None) -> float:
@@ -179,18 +186,22 @@ def _distinct(trials: tuple[Trial, ...]) -> list[Trial]:
 
 def _starts(
     problem: Problem, windows: Windows, unknowns: Unknowns, profile: Profile
-) -> list[Point]:
-    """The best trials with more and less of their linear step, and the base as it is.
+) -> tuple[list[Point], list[Point]]:
+    """Points near the base, and points at the priors, for the best trials.
 
-    The last one makes sure that no refit ends worse than what it was added to.
+    Near the base: with more and less of the linear step of the nuisances.  At the priors: the base
+    may have moved its parameters far to imitate what is missing.
     """
     base = problem.base
     starts = carried(base, windows)
-    points = []
-    for trial in _distinct(profile.trials):
-        for share in SHARES:
-            moved_t = base.unknowns.clipped(base.point.t + share * trial.nuisance)
-            values = {**windows.plant.values, **base.unknowns.values(moved_t), **trial.values}
-            points.append(Point(unknowns.clipped(unknowns.scaled(values)), starts))
-    values = {**windows.plant.values, **base.plant.values}
-    return [*points, Point(unknowns.clipped(unknowns.scaled(values)), starts)]
+
+    def point(t: np.ndarray, trial: Trial) -> Point:
+        nominal = base.unknowns.values(base.unknowns.clipped(t))
+        values = {**windows.plant.values, **nominal, **trial.values}
+        return Point(unknowns.clipped(unknowns.scaled(values)), starts)
+
+    trials = _distinct(profile.trials)
+    near = [point(base.point.t + share * t.nuisance, t) for t in trials for share in SHARES]
+    own = np.array([name in {c.strength for c in problem.added} for name in base.unknowns.names])
+    prior = [point(np.where(own, base.point.t, 0.0), trial) for trial in trials]
+    return near, prior

@@ -12,7 +12,7 @@ from workbench.diagnosis.improve import fitted_rig
 from workbench.diagnosis.problem import Problem, pose, split
 from workbench.diagnosis.refit import posterior_covariance
 from workbench.fitting.gauss_newton import Fit
-from workbench.fitting.search import refit_starts
+from workbench.fitting.start_states import refit_starts
 from workbench.plant import require
 from workbench.recording import Recording
 from workbench.rig import Rig

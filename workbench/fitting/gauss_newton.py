@@ -123,17 +123,16 @@ def fit_windows(
     ``at`` are derivatives to begin with, taken near by.
     """
     point = start or Point(unknowns.scaled(windows.plant.values), windows.start)
-    chi2, cost = (v[0] for v in points_cost(windows, unknowns, [point]))
+    now = points_costs(windows, unknowns, [point]).best
     fresh, converged, stale = False, False, at is None
     for _ in range(iterations):
         if stale or at is None:
             at, fresh = linearise(windows, unknowns, point), True
-        trials = _trials(windows, unknowns, at, point)
-        chi2s, costs = points_cost(windows, unknowns, trials)
-        best = int(np.argmin(costs))
-        fall = (cost - costs[best]) / max(cost, 1e-12)
+        found = _stepped(windows, unknowns, at, point, now)
+        fall = (now.cost - found.cost) / max(now.cost, 1e-12)
         if fall > 0:
-            point, chi2, cost = trials[best], chi2s[best], costs[best]
+            now = found
+            point = found.point
         converged = fall < CONVERGED
         if converged and fresh:
             break
@@ -141,7 +140,26 @@ def fit_windows(
         if not stale:
             at = moved(windows, unknowns, at, point)
     at = moved(windows, unknowns, at, point) if at else linearise(windows, unknowns, point)
-    return Fit(windows, unknowns, point, float(chi2), float(cost), converged, at)
+    return Fit(windows, unknowns, point, now.chi2, now.cost, converged, at)
+
+
+def _stepped(windows: Windows, unknowns: Unknowns, at: Linearised, point: Point, now: Cost) -> Cost:
+    """The best of a batch of damped steps.
+
+    Where none brings much, the windows that got worse under the full step are left out of the
+    quadratic model, and its steps are tried again: a window that runs across a break-away has
+    slopes that hold nowhere, and would hold all others back.
+    """
+    batch = points_costs(windows, unknowns, _trials(windows, unknowns, at, point))
+    best = batch.best
+    if now.cost - best.cost > AGAIN * now.cost:
+        return best
+    worse = batch.full.by_window > now.by_window
+    if not worse.any() or worse.all():
+        return best
+    others = _trials(windows, unknowns, at, point, ~worse)
+    again = points_costs(windows, unknowns, others).best
+    return min(best, again, key=lambda each: each.cost)
 
 
 def borrowed(
@@ -168,11 +186,17 @@ def borrowed(
     return replace(near, point=point, residual=residual, parameters=J)
 
 
-def _trials(windows: Windows, unknowns: Unknowns, at: Linearised, point: Point) -> list[Point]:
-    """Damped steps from a point, within bounds."""
+def _trials(
+    windows: Windows,
+    unknowns: Unknowns,
+    at: Linearised,
+    point: Point,
+    counted: np.ndarray | None = None,
+) -> list[Point]:
+    """Damped steps from a point, within bounds; parameters follow the counted windows."""
     return [
         Point(unknowns.clipped(point.t + dt), point.starts + dx * windows.start_deviation)
-        for dt, dx in _damped_steps(at, unknowns)
+        for dt, dx in _damped_steps(at, unknowns, counted)
     ]
 
 
@@ -189,7 +213,7 @@ def moved(windows: Windows, unknowns: Unknowns, at: Linearised, point: Point) ->
 
 def best_start(windows: Windows, unknowns: Unknowns, points: list[Point]) -> Point:
     """The point of least cost, all run in one batch."""
-    return points[int(np.argmin(points_cost(windows, unknowns, points)[1]))]
+    return points_costs(windows, unknowns, points).best.point
 
 
 def linearise(windows: Windows, unknowns: Unknowns, point: Point) -> Linearised:
@@ -253,9 +277,13 @@ class Normal:
     precision: np.ndarray
 
 
-def normal_equations(at: Linearised, unknowns: Unknowns) -> Normal:
-    """The quadratic model at a point; see :class:`Normal`."""
+def normal_equations(
+    at: Linearised, unknowns: Unknowns, counted: np.ndarray | None = None
+) -> Normal:
+    """The quadratic model at a point, of all windows or of those ``counted``; see the class."""
     r, J = at.projected(at.residual[:, :, None])[:, :, 0], at.projected(at.parameters)
+    if counted is not None:
+        r, J = r * counted[:, None], J * counted[:, None, None]
     flat = J.reshape(J.shape[0] * J.shape[1], J.shape[2])
     gradient = flat.T @ r.ravel() + unknowns.precision * at.point.t
     free = ~unknowns.pinned(at.point.t, gradient)
@@ -264,9 +292,11 @@ def normal_equations(at: Linearised, unknowns: Unknowns) -> Normal:
     return Normal(hessian, gradient * free, r, flat.reshape(J.shape), unknowns.precision * free)
 
 
-def _damped_steps(at: Linearised, unknowns: Unknowns) -> list[tuple[np.ndarray, np.ndarray]]:
+def _damped_steps(
+    at: Linearised, unknowns: Unknowns, counted: np.ndarray | None = None
+) -> list[tuple[np.ndarray, np.ndarray]]:
     """Gauss-Newton steps of unknowns and start states, one per damping."""
-    normal = normal_equations(at, unknowns)
+    normal = normal_equations(at, unknowns, counted)
     H, g = normal.hessian, normal.gradient
     steps = []
     for damping in DAMPINGS:
@@ -280,16 +310,45 @@ def _damped_steps(at: Linearised, unknowns: Unknowns) -> list[tuple[np.ndarray, 
     return steps
 
 
-def points_cost(
-    windows: Windows, unknowns: Unknowns, points: list[Point]
-) -> tuple[np.ndarray, np.ndarray]:
-    """(chi2, cost with priors) of each point, shapes (n,)."""
+@dataclass(frozen=True)
+class Cost:
+    """What a point costs: squared residuals, and with priors; ``by_window`` has (n_windows,)."""
+
+    point: Point
+    chi2: float
+    cost: float
+    by_window: np.ndarray
+
+
+@dataclass(frozen=True)
+class Costs:
+    """Costs of a batch of points."""
+
+    rows: tuple[Cost, ...]
+
+    @property
+    def best(self) -> Cost:
+        """The cheapest."""
+        return min(self.rows, key=lambda each: each.cost)
+
+    @property
+    def full(self) -> Cost:
+        """The first of the batch: of damped steps the undamped one."""
+        return self.rows[0]
+
+
+def points_costs(windows: Windows, unknowns: Unknowns, points: list[Point]) -> Costs:
+    """Costs of points, all run in one batch."""
     plants = [plant_at(windows, unknowns, point.t) for point in points]
     r = windows.residuals(plants, np.array([point.starts for point in points]))
-    chi2 = np.sum(r**2, axis=(1, 2, 3))
-    away = np.array([(q.starts - windows.start) / windows.start_deviation for q in points])
-    prior = np.array([np.sum(unknowns.precision * q.t**2) for q in points])
-    return chi2, chi2 + prior + np.sum(away**2, axis=(1, 2))
+    rows = []
+    for point, residual in zip(points, r, strict=True):
+        squares = np.sum(residual**2, axis=(0, 2))
+        away = (point.starts - windows.start) / windows.start_deviation
+        own = squares + np.sum(away**2, axis=0)
+        prior = float(np.sum(unknowns.precision * point.t**2))
+        rows.append(Cost(point, float(squares.sum()), float(own.sum()) + prior, own))
+    return Costs(tuple(rows))
 
 
 def plant_at(windows: Windows, unknowns: Unknowns, t: np.ndarray) -> Plant:

@@ -1,49 +1,14 @@
-"""Fits with less or more freedom: start states alone, and a search along each unknown."""
+"""Fits in which only the start states of windows move."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 
-from workbench.fitting.gauss_newton import (
-    CONVERGED,
-    Fit,
-    Point,
-    fit_windows,
-    moved,
-    points_cost,
-    unit,
-)
+from workbench.fitting.gauss_newton import Fit, Point, fit_windows, moved
 from workbench.fitting.unknowns import Unknowns
 from workbench.fitting.windows import Windows
-
-SEARCHES = 3
-SEARCH_MOVES = (-0.8, -0.3, 0.3, 0.8)  # of the scale of an unknown
-
-
-def searched(fit: Fit, iterations: int) -> Fit:
-    """A fit that also looks along each unknown alone, and goes on from there.
-
-    Near break-aways the cost is rough: a Gauss-Newton step in all unknowns at once may find no way
-    down where a step in one of them does.
-    """
-    for _ in range(SEARCHES):
-        points = [fit.point, *_neighbours(fit)]
-        costs = points_cost(fit.windows, fit.unknowns, points)[1]
-        best = int(np.argmin(costs))
-        if not costs[best] < (1.0 - CONVERGED) * fit.cost:
-            return fit
-        fit = fit_windows(fit.windows, fit.unknowns, points[best], iterations)
-    return fit
-
-
-def _neighbours(fit: Fit) -> list[Point]:
-    """Points that differ from a fit in one unknown."""
-    t = fit.point.t
-    moves = [move * unit(len(t), k) for k in range(len(t)) for move in SEARCH_MOVES]
-    return [replace(fit.point, t=fit.unknowns.clipped(t + move)) for move in moves]
 
 
 def refit_starts(
