@@ -32,9 +32,9 @@ from workbench.recording import Recording
 from workbench.rig import Rig
 
 REFITTED = 5  # candidates that are followed beyond the scan at the most
-ALWAYS_REFITTED = 3
+ALWAYS_REFITTED = 2
 SHIFTS_REFITTED = 2  # parameters that leave their priors
-WORTH_A_REFIT = 0.25  # of the best drop of the scan
+WORTH_A_REFIT = 0.25  # of the best drop of the scan, for shifts of the best refit
 CERTAIN_SHARE = 0.5  # an accepted candidate above it needs no comparison with an empirical law
 LAW_MARGIN = 0.15  # by how much of the misfit a law must beat the catalogue
 
@@ -118,7 +118,8 @@ def _followed(problem: Problem, progress: Progress) -> _Followed:
             progress(f"refit with {profile.candidate.name}")
             refits.append(refit(problem, profile))
     moved = shifts(problem)
-    for shift in [each for each in moved if each.leaves][:SHIFTS_REFITTED]:
+    least = WORTH_A_REFIT * max((each.drop_train for each in refits), default=0.0)
+    for shift in [each for each in moved if each.leaves and each.drop > least][:SHIFTS_REFITTED]:
         progress(f"refit with {shift.name} free")
         refits.append(refit_shift(problem, shift))
     refits.sort(key=lambda each: (not predicts(each), -each.drop_train))

@@ -10,7 +10,7 @@ from workbench.fitting.gauss_newton import Fit, Linearised, Point, fit_windows, 
 from workbench.fitting.noise import measured_noise
 from workbench.fitting.start_states import refit_starts
 from workbench.fitting.unknowns import Unknowns, nominal_unknowns
-from workbench.fitting.windows import MOST_WINDOWS, WINDOW_S, Windows, cut_windows
+from workbench.fitting.windows import MOST_WINDOWS, WINDOW_S, cut_windows
 from workbench.plant import Candidate, Plant
 from workbench.recording import Recording
 from workbench.rig import Rig
@@ -18,6 +18,7 @@ from workbench.rig import Rig
 LONGEST_WINDOW_S = 0.4
 FIRST_ITERATIONS = 3  # with scales from the model as it came
 ITERATIONS = 12  # with scales from the first fit
+LEAST_HELD_OUT_WINDOWS = 24
 LEAST_IMPROVEMENT = 0.03  # of the misfit, for a prior fit to be taken up again
 
 
@@ -127,7 +128,8 @@ def pose(
     base = fit_windows(windows, unknowns, rough.point, iterations=ITERATIONS)
     held_out = None
     if validation:
-        held_out = refit_starts(_held_out(validation, base, noise, most_windows), base.plant.values)
+        most = max(len(windows) // 2, LEAST_HELD_OUT_WINDOWS)
+        held_out = _held_out(validation, base, noise, most)
     return Problem(rig, whole, added, base, held_out)
 
 
@@ -145,12 +147,16 @@ def window_length_s(plant: Plant, recordings: Sequence[Recording]) -> float:
 
 def _held_out(
     validation: Iterable[Recording], base: Fit, noise: dict[str, float], most: int
-) -> Windows:
-    """Windows of the held-out recordings on the yardstick of the training."""
+) -> Fit:
+    """The base on windows of the held-out recordings, on the yardstick of the training.
+
+    Half as many windows as the training has are enough to judge a plant that is not fitted to them.
+    """
     length_s = base.windows.length * base.windows.recordings[0].sample_time_s
     windows = cut_windows(base.windows.plant, validation, noise, length_s, most)
     windows = windows.scaled_like(base.windows)
-    return windows.capped(refit_starts(windows, base.plant.values).residual)
+    rough = refit_starts(windows, base.plant.values)
+    return refit_starts(windows.capped(rough.residual), base.plant.values, rough)
 
 
 def split(recordings: Sequence[Recording]) -> tuple[list[Recording], list[Recording]]:

@@ -25,9 +25,9 @@ PARAMETER_STEP = 0.25  # of the scale of an unknown
 START_STEP = 0.25  # of the deviation of a start state
 LONGEST_STEP = 4.0  # of a scaled unknown in one step: beyond, the plant may be another one
 LONGEST_START_STEP = 8.0  # of a start state, in its deviations
-DAMPINGS = (0.0, 0.1, 1.0, 10.0, 100.0)
+DAMPINGS = (0.0, 0.3, 3.0, 30.0)
 AGAIN = 0.02  # relative fall of the cost above which derivatives are used once more
-CONVERGED = 2e-3  # relative fall of the cost below which a fit has converged
+CONVERGED = 5e-3  # relative fall of the cost below which a fit has converged
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class Fit:
     cost
         The same with the priors of parameters and start states.
     converged
-        False where the last step still brought more than 0.2 %.
+        False where the last step still brought more than 0.5 %.
     derivatives
         Those that the last step used, with the residual of where the fit ended.
     """

@@ -26,7 +26,7 @@ def refit_starts(
     start, at = None, None
     if near is not None:
         start = Point(np.zeros(0), carried(near, windows))
-        at = near.derivatives if near.windows.plant is windows.plant else None
+        at = near.derivatives if near.windows is windows else None
         at = moved(windows, nothing, at, start) if at else None
     return fit_windows(windows, nothing, start, iterations, at)
 
