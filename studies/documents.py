@@ -12,7 +12,8 @@ if TYPE_CHECKING:
     from linearize.modes import HybridModel
     from studies.closed_loop_check import Check
     from workbench.comparison.compare import Comparison
-    from workbench.diagnosis.result import Diagnosis, Law, Ranked, SignalError, Where
+    from workbench.diagnosis.result import Diagnosis, Law, Ranked, Where
+    from workbench.fitting.errors import SignalError
 
 Document = dict[str, Any]
 

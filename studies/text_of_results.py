@@ -14,7 +14,8 @@ if TYPE_CHECKING:
 
     from workbench.comparison.compare import Comparison, RecordingComparison
     from workbench.diagnosis.improve import Addition, Improvement
-    from workbench.diagnosis.result import Diagnosis, Ranked, SignalError
+    from workbench.diagnosis.result import Diagnosis, Ranked
+    from workbench.fitting.errors import SignalError
     from workbench.fitting.fit import FitReport
 
 SHOWN_RANKS = 12

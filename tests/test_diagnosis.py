@@ -6,10 +6,10 @@ import pytest
 from workbench.diagnosis.diagnose import diagnose
 from workbench.diagnosis.improve import accept, add, improve
 from workbench.diagnosis.judge import alignment
-from workbench.diagnosis.problem import pose
 from workbench.diagnosis.result import DecidedBy, Verdict
 from workbench.diagnosis.scan import scan
 from workbench.fitting.fit import fit
+from workbench.fitting.problem import pose
 from workbench.recording import Recording
 from workbench.rig import default_rig, load_rig
 from workbench.rig_writing import rig_text

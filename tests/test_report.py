@@ -22,13 +22,13 @@ from workbench.diagnosis.result import (
     Diagnosis,
     Law,
     Ranked,
-    SignalError,
     Size,
     Verdict,
     Where,
 )
 from workbench.effect import Kind
 from workbench.errors import InputError
+from workbench.fitting.errors import SignalError
 from workbench.plants import PLANTS
 
 PLANT = PLANTS["servo_drive"]()

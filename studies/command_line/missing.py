@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from studies.command_line.application import (
+    STOPPED,
     Figures,
     Json,
     Output,
@@ -126,6 +127,8 @@ def improve(
             say(f"report in {report_improvement(found, report, command_text())}")
         typer.echo(improvement_text(found, unit_names(known.plant.measured)))
         typer.echo(f"wrote {output}")
+        if found.stopped:
+            raise typer.Exit(STOPPED)
 
 
 @app.command(cls=Spread, epilog=example(FIT))

@@ -13,7 +13,7 @@ from workbench.units import display_scale, display_unit, public_name
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from workbench.diagnosis.result import SignalError
+    from workbench.fitting.errors import SignalError
 
 
 def budget_figure(budget: Sequence[tuple[str, float, float]]) -> Figure:

@@ -18,8 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from workbench.comparison.regimes import regimes, shares
-from workbench.diagnosis.result import SignalError
 from workbench.filtering import filter_pass
+from workbench.fitting.errors import SignalError
 from workbench.fitting.noise import measured_noise
 from workbench.fitting.start_states import refit_starts
 from workbench.fitting.starts import guessed_states

@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from workbench.diagnosis.errors import errors_of
 from workbench.diagnosis.judge import (
     HELD_OUT_REASON,
     SHARE_REASON,
@@ -20,13 +19,14 @@ from workbench.diagnosis.judge import (
     tie_group,
 )
 from workbench.diagnosis.law import empirical_law
-from workbench.diagnosis.problem import Problem, improved_base, pose, split
 from workbench.diagnosis.refit import Refit, refit, refit_shift
 from workbench.diagnosis.result import DecidedBy, Diagnosis, Law, Ranked, Verdict
 from workbench.diagnosis.scan import Profile, scan
 from workbench.diagnosis.shifts import LEAVES_PRIOR, Shift, shifts
 from workbench.diagnosis.where import locate
 from workbench.effect import Kind
+from workbench.fitting.errors import errors_of
+from workbench.fitting.problem import Problem, improved_base, pose, split
 from workbench.fitting.windows import MOST_WINDOWS
 from workbench.recording import Recording
 from workbench.rig import Rig
@@ -160,7 +160,30 @@ def _ranking(
     refused = [rows[name] for name in order if not predicts_row(rows[name])]
     rest = [_shifted(shift) for shift in moved if shift.candidate.name not in rows]
     rest += [_scanned_row(problem, p) for p in profiles if p.candidate.name not in rows]
-    return (*followed, *refused, *sorted(rest, key=lambda row: -row.drop_train))
+    rest.sort(key=lambda row: -row.drop_train)
+    return (*followed, *refused, *rest, *_not_applicable(problem))
+
+
+def _not_applicable(problem: Problem) -> list[Ranked]:
+    """Causes of the plant that have no place where the recording measures what they produce."""
+    here = problem.whole.candidates
+    nothing = float("nan")
+    return [
+        Ranked(
+            candidate=candidate,
+            kind=candidate.cause.kind,
+            size={},
+            drop_train=nothing,
+            drop_validation=nothing,
+            tied_with=(),
+            compensable=nothing,
+            decided_by=DecidedBy.NOT_APPLICABLE,
+            accepted=False,
+            reasons=("not applicable: measured",),
+        )
+        for name, candidate in problem.rig.plant.candidates.items()
+        if name not in here
+    ]
 
 
 def predicts_row(row: Ranked) -> bool:

@@ -12,12 +12,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from workbench.diagnosis.diagnose import Progress, diagnose, silent
-from workbench.diagnosis.errors import Errors, errors_of
-from workbench.diagnosis.problem import Problem, pose, split
-from workbench.diagnosis.refit import posterior_deviation, refit
+from workbench.diagnosis.refit import refit
 from workbench.diagnosis.result import Diagnosis
 from workbench.diagnosis.scan import scan
+from workbench.fitting.errors import Errors, errors_of
 from workbench.fitting.gauss_newton import Fit
+from workbench.fitting.posterior import fitted_rig, posterior_deviation
+from workbench.fitting.problem import Problem, pose, split
 from workbench.plant import Candidate, require
 from workbench.recording import Recording
 from workbench.rig import Rig
@@ -55,12 +56,14 @@ class Improvement:
     """Rounds of diagnosis and addition.
 
     budget    (label, chi2 per sample in training, the same in validation), from bare to final
+    stopped   True where the user stopped it after at least one finished round
     """
 
     rig: Rig
     steps: tuple[Addition, ...]
     diagnoses: tuple[Diagnosis, ...]
     budget: tuple[tuple[str, float, float], ...]
+    stopped: bool = False
 
 
 def add(
@@ -105,16 +108,24 @@ def improve(
     """Diagnose and add until nothing in the catalogue earns its place.
 
     The effect added is the first of the ranking where it passes every criterion, also where an
-    empirical law would do better: a physical effect comes first.
+    empirical law would do better: a physical effect comes first.  An interrupt after the first
+    finished round ends it there, with what is finished.
     """
     if not validation:
         train, validation = split(train)
     steps: list[Addition] = []
     diagnoses: list[Diagnosis] = []
-    current = rig
+    current, stopped = rig, False
     for count in range(1, MOST_ROUNDS + 1):
         progress(f"round {count}")
-        diagnosis = diagnose(current, train, validation, progress)
+        try:
+            diagnosis = diagnose(current, train, validation, progress)
+        except KeyboardInterrupt:
+            if not steps:
+                raise
+            progress(f"stopped in round {count}: {len(steps)} finished")
+            stopped = True
+            break
         diagnoses.append(diagnosis)
         best = diagnosis.ranking[0] if diagnosis.ranking else None
         if best is None or best.fit is None or not best.accepted:
@@ -123,7 +134,7 @@ def improve(
         steps.append(accept(current, diagnosis))
         current = _freed(current, best.candidate, best.fit)
     final = steps[-1].rig if steps else rig
-    return Improvement(final, tuple(steps), tuple(diagnoses), _budget(diagnoses))
+    return Improvement(final, tuple(steps), tuple(diagnoses), _budget(diagnoses), stopped)
 
 
 def accept(rig: Rig, diagnosis: Diagnosis) -> Addition:
@@ -148,20 +159,6 @@ def pose_again(rig: Rig, diagnosis: Diagnosis) -> Problem:
     plant = rig.fit_for(diagnosis.base.windows.recordings[0])
     added = tuple(plant.candidates[n] for n in rig.added if n in plant.candidates)
     return Problem(rig, plant, added, diagnosis.base, diagnosis.base_validation)
-
-
-def fitted_rig(rig: Rig, fit: Fit, added: Sequence[str], note: str = "") -> Rig:
-    """The rig at fitted values with their standard deviations, and one note more."""
-    ours = rig.plant.values
-    values = {n: v for n, v in fit.plant.values.items() if n in ours and n in fit.unknowns.names}
-    deviations = dict(zip(fit.unknowns.names, posterior_deviation(fit).tolist(), strict=True))
-    return replace(
-        rig,
-        plant=rig.plant.with_values(values),
-        added=(*rig.added, *added),
-        deviations={**rig.deviations, **{n: d for n, d in deviations.items() if d > 0}},
-        notes=(*rig.notes, note) if note else rig.notes,
-    )
 
 
 def _present(problem: Problem, candidate: Candidate) -> bool:

@@ -15,11 +15,11 @@ from dataclasses import replace
 import numpy as np
 
 from workbench.diagnosis.judge import reasons_against
-from workbench.diagnosis.problem import Problem, misfit
 from workbench.diagnosis.refit import Refit, refit
 from workbench.diagnosis.result import Law
 from workbench.diagnosis.scan import scan
 from workbench.effects.empirical import EmpiricalFlow, EmpiricalForce
+from workbench.fitting.problem import Problem, misfit
 from workbench.parts import Body, Chamber
 from workbench.plant import Candidate, Plant
 

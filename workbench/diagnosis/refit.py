@@ -11,20 +11,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from workbench.diagnosis.problem import Problem, misfit
 from workbench.diagnosis.result import Size
-from workbench.diagnosis.scan import Profile, Trial, staged
+from workbench.diagnosis.scan import Profile, Trial
 from workbench.diagnosis.shifts import Shift
 from workbench.fitting.error_model import OUTLYING
-from workbench.fitting.gauss_newton import (
-    Fit,
-    Linearised,
-    Point,
-    best_start,
-    borrowed,
-    fit_windows,
-    normal_equations,
-)
+from workbench.fitting.gauss_newton import Fit, best_start, fit_windows
+from workbench.fitting.linearised import Linearised, Point, borrowed
+from workbench.fitting.posterior import posterior_deviation
+from workbench.fitting.problem import Problem, misfit, staged
 from workbench.fitting.start_states import carried
 from workbench.fitting.unknowns import WIDE, Unknowns
 from workbench.fitting.windows import Windows
@@ -133,20 +127,6 @@ def sizes(fit: Fit, names: tuple[str, ...]) -> dict[str, Size]:
     values = fit.unknowns.values(fit.point.t)
     index = {name: k for k, name in enumerate(fit.unknowns.names)}
     return {n: Size(values[n], float(deviation[index[n]])) for n in names if n in index}
-
-
-def posterior_deviation(fit: Fit) -> np.ndarray:
-    """Standard deviation of each unknown from the curvature of the cost, shape (n_p,).
-
-    Scales already carry the correlation time of the residuals, so no further inflation is due.
-    """
-    return np.sqrt(np.maximum(np.diag(posterior_covariance(fit)), 0.0)) * fit.unknowns.scale
-
-
-def posterior_covariance(fit: Fit) -> np.ndarray:
-    """Covariance of the scaled unknowns from the curvature of the cost, shape (n_p, n_p)."""
-    normal = normal_equations(fit.derivatives, fit.unknowns)
-    return np.linalg.inv(normal.hessian) if len(fit.unknowns) else np.zeros((0, 0))
 
 
 def _drop(before: Fit | None, after: Fit | None) -> float:

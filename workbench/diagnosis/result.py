@@ -9,6 +9,7 @@ from enum import Enum
 import numpy as np
 
 from workbench.effect import Kind
+from workbench.fitting.errors import SignalError
 from workbench.fitting.gauss_newton import Fit
 from workbench.plant import Candidate
 
@@ -69,15 +70,6 @@ class Ranked:
     accepted: bool
     reasons: tuple[str, ...]
     fit: Fit | None = field(default=None, repr=False)
-
-
-@dataclass(frozen=True)
-class SignalError:
-    """Error of one output over windows: RMSE in SI, fit percent, noise and chi2 per sample."""
-
-    rmse: float
-    fit_percent: float
-    noise: float
 
 
 @dataclass(frozen=True)

@@ -26,13 +26,8 @@ from itertools import product
 
 import numpy as np
 
-from workbench.fitting.gauss_newton import (
-    Linearised,
-    Normal,
-    Point,
-    linearise,
-    normal_equations,
-)
+from workbench.fitting.linearised import Linearised, Normal, Point, linearise, normal_equations
+from workbench.fitting.problem import staged
 from workbench.fitting.unknowns import Unknowns
 from workbench.fitting.windows import Windows
 from workbench.plant import Candidate, Plant
@@ -133,15 +128,6 @@ def metric_at(
     """The metric M at a point, from derivatives there or from one batch of simulations."""
     at = at or linearise(windows, unknowns, point)
     return Metric(at, normal_equations(at, unknowns))
-
-
-def staged(whole: Plant, *members: str) -> Plant:
-    """The whole plant without the absent effects that bring states, but for the named members.
-
-    Absent effects without states cost next to nothing, and so all their sizes run on one plant.
-    """
-    plain = [effect.name for effect in whole.effects if not tuple(effect.states())]
-    return whole.lean(keep=[*plain, *members])
 
 
 def scan(

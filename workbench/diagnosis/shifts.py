@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from workbench.diagnosis.problem import Problem
 from workbench.diagnosis.result import Size
-from workbench.fitting.gauss_newton import normal_equations
+from workbench.fitting.linearised import normal_equations
+from workbench.fitting.problem import Problem
 from workbench.plant import Candidate
 
 LEAVES_PRIOR = 3.0

@@ -16,10 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from workbench.comparison.regimes import regimes, shares
-from workbench.diagnosis.problem import Problem
 from workbench.diagnosis.result import Dependence, Where
 from workbench.filtering import FilterResult, filter_pass, smooth
 from workbench.fitting.gauss_newton import Fit
+from workbench.fitting.problem import Problem
 from workbench.parts import Body, Chamber
 from workbench.plant import Plant
 from workbench.recording import Recording

@@ -7,11 +7,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from workbench.diagnosis.errors import Errors, errors_of
-from workbench.diagnosis.improve import fitted_rig
-from workbench.diagnosis.problem import Problem, pose, split
-from workbench.diagnosis.refit import posterior_covariance
+from workbench.fitting.errors import Errors, errors_of
 from workbench.fitting.gauss_newton import Fit
+from workbench.fitting.posterior import fitted_rig, posterior_covariance
+from workbench.fitting.problem import Problem, pose, split
 from workbench.fitting.start_states import refit_starts
 from workbench.plant import require
 from workbench.recording import Recording

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from workbench.fitting.gauss_newton import Fit, Point, fit_windows, moved
+from workbench.fitting.gauss_newton import Fit, fit_windows
+from workbench.fitting.linearised import Point, moved
 from workbench.fitting.unknowns import Unknowns
 from workbench.fitting.windows import Windows
 

@@ -19,11 +19,16 @@ import numpy as np
 
 from workbench.effect import Effect
 from workbench.fitting.error_model import OUTLYING, ErrorModel, error_model
-from workbench.fitting.starts import guessed_states
-from workbench.model import Model
+from workbench.fitting.window_cuts import (
+    cut_inputs,
+    cut_rows,
+    thinned,
+    window_firsts,
+    window_run,
+    window_starts,
+)
 from workbench.plant import Plant
 from workbench.recording import Recording
-from workbench.simulation import inputs
 
 WINDOW_S = 0.2
 MOST_WINDOWS = 1500  # five minutes: beyond, a fit learns little and takes long
@@ -126,7 +131,7 @@ class Windows:
 
     def with_plant(self, plant: Plant) -> Windows:
         """The same windows for a plant with other effects; states it shares keep their start."""
-        start, deviation = _starts(plant, self.recordings, self.firsts, self.noise)
+        start, deviation = window_starts(plant, self.recordings, self.firsts, self.noise)
         ours, theirs = list(plant.state_list), list(self.plant.state_list)
         for row, name in enumerate(ours):
             if name in theirs:
@@ -167,12 +172,12 @@ class Windows:
             m for m in plant.effects if not m.absent and type(m).resample is not Effect.resample
         )
         if timing:
-            return _cut_inputs(plant, self.recordings, self.firsts, self.length)
+            return cut_inputs(plant, self.recordings, self.firsts, self.length)
         return self._plain_inputs
 
     @cached_property
     def _plain_inputs(self) -> tuple[np.ndarray, np.ndarray]:
-        return _cut_inputs(self.plant.lean(), self.recordings, self.firsts, self.length)
+        return cut_inputs(self.plant.lean(), self.recordings, self.firsts, self.length)
 
 
 def cut_windows(
@@ -193,123 +198,21 @@ def cut_windows(
     """
     recordings = tuple(recordings)
     length = max(round(window_s / recordings[0].sample_time_s), 2)
-    firsts = _thinned(tuple(_firsts(recording, length) for recording in recordings), most)
+    firsts = thinned(tuple(window_firsts(recording, length) for recording in recordings), most)
     if not any(firsts):
         raise ValueError(f"no piece of the recordings is as long as one window of {window_s:g} s")
     measured = np.concatenate(
         [
-            _cut(recording.rows(plant.measured), own, length)
+            cut_rows(recording.rows(plant.measured), own, length)
             for recording, own in zip(recordings, firsts, strict=True)
         ],
         axis=1,
     )
     sigma = np.array([noise[name] for name in plant.measured])
-    start, deviation = _starts(plant, recordings, firsts, sigma)
+    start, deviation = window_starts(plant, recordings, firsts, sigma)
     scale = np.tile(sigma[:, None], (1, measured.shape[1]))
     one = np.ones((len(sigma), 1))
     errors = ErrorModel(sigma[:, None], 0.0 * one, one, one)
     return Windows(
         plant, recordings, firsts, length, measured, sigma, scale, errors, start, deviation
     )
-
-
-def window_run(plant: Plant, sample_time_s: float, length: int) -> ca.Function:
-    """(x0, u, d, p) -> outputs over one window; u, d of L columns, result (n_y, L).
-
-    ``x0`` is the start as the sensors show it; see :class:`Windows`.
-    """
-    model = plant.model
-    x0, u, d, p = (
-        ca.MX.sym(name, symbol.numel(), columns)
-        for name, symbol, columns in zip("xudp", model.symbols, (1, length, length, 1), strict=True)
-    )
-    x = _behind_sensors(model, x0, u[:, 0], d[:, 0], p)
-    if model.states:
-        later = model.compiled_step(sample_time_s).mapaccum(length - 1)
-        columns = ca.repmat(p, 1, length - 1)
-        x = ca.horzcat(x, later(x, u[:, :-1], d[:, :-1], columns))
-    else:
-        x = ca.MX(0, length)
-    y = model.h.map(length)(x, u, d, ca.repmat(p, 1, length))
-    return ca.Function("window", [x0, u, d, p], [y])
-
-
-def _behind_sensors(model: Model, seen: ca.MX, u: ca.MX, d: ca.MX, p: ca.MX) -> ca.MX:
-    """The states behind those that sensors show: x - (y - x) where a state x is measured as y."""
-    distorted = model.h(seen, u, d, p)
-    rows = {name: k for k, name in enumerate(model.measured)}
-    return ca.vertcat(
-        ca.MX(0, 1),
-        *(
-            2.0 * seen[k] - distorted[rows[name]] if name in rows else seen[k]
-            for k, name in enumerate(model.states)
-        ),
-    )
-
-
-def _thinned(firsts: tuple[tuple[int, ...], ...], most: int) -> tuple[tuple[int, ...], ...]:
-    """At most so many windows, evenly over all recordings."""
-    total = sum(len(own) for own in firsts)
-    if total <= most:
-        return firsts
-    kept = set(np.linspace(0, total - 1, most).round().astype(int).tolist())
-    places = iter(range(total))
-    return tuple(tuple(k for k in own if next(places) in kept) for own in firsts)
-
-
-def _firsts(recording: Recording, length: int) -> tuple[int, ...]:
-    ends = (*recording.starts[1:], len(recording))
-    return tuple(
-        first
-        for start, end in zip(recording.starts, ends, strict=True)
-        for first in range(start, end - length + 1, length)
-    )
-
-
-def _cut(rows: np.ndarray, firsts: tuple[int, ...], length: int) -> np.ndarray:
-    """Rows (n, samples) cut into (n, n_windows, L)."""
-    return (
-        np.stack([rows[:, k : k + length] for k in firsts], axis=1)
-        if firsts
-        else np.zeros((rows.shape[0], 0, length))
-    )
-
-
-def _cut_inputs(
-    plant: Plant,
-    recordings: tuple[Recording, ...],
-    firsts: tuple[tuple[int, ...], ...],
-    length: int,
-) -> tuple[np.ndarray, np.ndarray]:
-    pairs = [inputs(plant, recording) for recording in recordings]
-    cut = (
-        np.concatenate(
-            [_cut(pair[k], own, length) for pair, own in zip(pairs, firsts, strict=True)], axis=1
-        )
-        for k in (0, 1)
-    )
-    u, d = (rows.reshape(rows.shape[0], rows.shape[1] * length) for rows in cut)
-    return u, d
-
-
-def _starts(
-    plant: Plant,
-    recordings: tuple[Recording, ...],
-    firsts: tuple[tuple[int, ...], ...],
-    noise: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Start states and their standard deviations, shapes (n_x, n_windows).
-
-    The guess of a state that is recorded is no better than the noise ``noise``, shape (n_y,).
-    """
-    columns = [
-        guessed_states(plant, recording)[:, :, list(own)]
-        for recording, own in zip(recordings, firsts, strict=True)
-    ]
-    guess, deviation = np.concatenate(columns, axis=2)
-    states = list(plant.state_list)
-    for name, sigma in zip(plant.measured, noise, strict=True):
-        if name in states:
-            row = states.index(name)
-            deviation[row] = np.hypot(deviation[row], sigma)
-    return guess, deviation

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
-from workbench.diagnosis.scan import staged
-from workbench.fitting.gauss_newton import Fit, Linearised, Point, fit_windows, points_costs
+from workbench.fitting.gauss_newton import Fit, fit_windows, points_costs
+from workbench.fitting.linearised import Linearised, Point
 from workbench.fitting.noise import measured_noise
 from workbench.fitting.start_states import refit_starts
 from workbench.fitting.unknowns import Unknowns, nominal_unknowns
@@ -76,6 +76,15 @@ def misfit(fit: Fit) -> float:
     prior has explained less than one that stays near it.
     """
     return max(fit.cost - fit.windows.floor, 1.0)
+
+
+def staged(whole: Plant, *members: str) -> Plant:
+    """The whole plant without the absent effects that bring states, but for the named members.
+
+    Absent effects without states cost next to nothing, and so all their sizes run on one plant.
+    """
+    plain = [effect.name for effect in whole.effects if not tuple(effect.states())]
+    return whole.lean(keep=[*plain, *members])
 
 
 def improved_base(problem: Problem, fits: Sequence[Fit]) -> Problem | None:

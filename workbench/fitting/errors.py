@@ -3,12 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
-from workbench.diagnosis.result import SignalError
 from workbench.fitting.gauss_newton import Fit
 from workbench.units import public_name
+
+
+@dataclass(frozen=True)
+class SignalError:
+    """Error of one output over windows: RMSE in SI, fit percent and noise."""
+
+    rmse: float
+    fit_percent: float
+    noise: float
+
 
 Errors = Mapping[str, Mapping[str, SignalError]]
 

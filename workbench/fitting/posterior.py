@@ -1,0 +1,40 @@
+"""What a fit knows of its parameters: posterior deviations, and the rig that carries them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from workbench.fitting.gauss_newton import Fit
+from workbench.fitting.linearised import normal_equations
+from workbench.rig import Rig
+
+
+def posterior_deviation(fit: Fit) -> np.ndarray:
+    """Standard deviation of each unknown from the curvature of the cost, shape (n_p,).
+
+    Scales already carry the correlation time of the residuals, so no further inflation is due.
+    """
+    return np.sqrt(np.maximum(np.diag(posterior_covariance(fit)), 0.0)) * fit.unknowns.scale
+
+
+def posterior_covariance(fit: Fit) -> np.ndarray:
+    """Covariance of the scaled unknowns from the curvature of the cost, shape (n_p, n_p)."""
+    normal = normal_equations(fit.derivatives, fit.unknowns)
+    return np.linalg.inv(normal.hessian) if len(fit.unknowns) else np.zeros((0, 0))
+
+
+def fitted_rig(rig: Rig, fit: Fit, added: Sequence[str], note: str = "") -> Rig:
+    """The rig at fitted values with their standard deviations, and one note more."""
+    ours = rig.plant.values
+    values = {n: v for n, v in fit.plant.values.items() if n in ours and n in fit.unknowns.names}
+    deviations = dict(zip(fit.unknowns.names, posterior_deviation(fit).tolist(), strict=True))
+    return replace(
+        rig,
+        plant=rig.plant.with_values(values),
+        added=(*rig.added, *added),
+        deviations={**rig.deviations, **{n: d for n, d in deviations.items() if d > 0}},
+        notes=(*rig.notes, note) if note else rig.notes,
+    )

@@ -1,0 +1,115 @@
+"""How recordings are cut into windows, and the simulation of one window."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+
+from workbench.fitting.starts import guessed_states
+from workbench.model import Model
+from workbench.plant import Plant
+from workbench.recording import Recording
+from workbench.simulation import inputs
+
+
+def window_run(plant: Plant, sample_time_s: float, length: int) -> ca.Function:
+    """(x0, u, d, p) -> outputs over one window; u, d of L columns, result (n_y, L).
+
+    ``x0`` is the start as the sensors show it; see :class:`Windows`.
+    """
+    model = plant.model
+    x0, u, d, p = (
+        ca.MX.sym(name, symbol.numel(), columns)
+        for name, symbol, columns in zip("xudp", model.symbols, (1, length, length, 1), strict=True)
+    )
+    x = _behind_sensors(model, x0, u[:, 0], d[:, 0], p)
+    if model.states:
+        later = model.compiled_step(sample_time_s).mapaccum(length - 1)
+        columns = ca.repmat(p, 1, length - 1)
+        x = ca.horzcat(x, later(x, u[:, :-1], d[:, :-1], columns))
+    else:
+        x = ca.MX(0, length)
+    y = model.h.map(length)(x, u, d, ca.repmat(p, 1, length))
+    return ca.Function("window", [x0, u, d, p], [y])
+
+
+def _behind_sensors(model: Model, seen: ca.MX, u: ca.MX, d: ca.MX, p: ca.MX) -> ca.MX:
+    """The states behind those that sensors show: x - (y - x) where a state x is measured as y."""
+    distorted = model.h(seen, u, d, p)
+    rows = {name: k for k, name in enumerate(model.measured)}
+    return ca.vertcat(
+        ca.MX(0, 1),
+        *(
+            2.0 * seen[k] - distorted[rows[name]] if name in rows else seen[k]
+            for k, name in enumerate(model.states)
+        ),
+    )
+
+
+def window_firsts(recording: Recording, length: int) -> tuple[int, ...]:
+    ends = (*recording.starts[1:], len(recording))
+    return tuple(
+        first
+        for start, end in zip(recording.starts, ends, strict=True)
+        for first in range(start, end - length + 1, length)
+    )
+
+
+def thinned(firsts: tuple[tuple[int, ...], ...], most: int) -> tuple[tuple[int, ...], ...]:
+    """At most so many windows, evenly over all recordings."""
+    total = sum(len(own) for own in firsts)
+    if total <= most:
+        return firsts
+    kept = set(np.linspace(0, total - 1, most).round().astype(int).tolist())
+    places = iter(range(total))
+    return tuple(tuple(k for k in own if next(places) in kept) for own in firsts)
+
+
+def cut_rows(rows: np.ndarray, firsts: tuple[int, ...], length: int) -> np.ndarray:
+    """Rows (n, samples) cut into (n, n_windows, L)."""
+    return (
+        np.stack([rows[:, k : k + length] for k in firsts], axis=1)
+        if firsts
+        else np.zeros((rows.shape[0], 0, length))
+    )
+
+
+def cut_inputs(
+    plant: Plant,
+    recordings: tuple[Recording, ...],
+    firsts: tuple[tuple[int, ...], ...],
+    length: int,
+) -> tuple[np.ndarray, np.ndarray]:
+    pairs = [inputs(plant, recording) for recording in recordings]
+    cut = (
+        np.concatenate(
+            [cut_rows(pair[k], own, length) for pair, own in zip(pairs, firsts, strict=True)],
+            axis=1,
+        )
+        for k in (0, 1)
+    )
+    u, d = (rows.reshape(rows.shape[0], rows.shape[1] * length) for rows in cut)
+    return u, d
+
+
+def window_starts(
+    plant: Plant,
+    recordings: tuple[Recording, ...],
+    firsts: tuple[tuple[int, ...], ...],
+    noise: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Start states and their standard deviations, shapes (n_x, n_windows).
+
+    The guess of a state that is recorded is no better than the noise ``noise``, shape (n_y,).
+    """
+    columns = [
+        guessed_states(plant, recording)[:, :, list(own)]
+        for recording, own in zip(recordings, firsts, strict=True)
+    ]
+    guess, deviation = np.concatenate(columns, axis=2)
+    states = list(plant.state_list)
+    for name, sigma in zip(plant.measured, noise, strict=True):
+        if name in states:
+            row = states.index(name)
+            deviation[row] = np.hypot(deviation[row], sigma)
+    return guess, deviation
