@@ -140,6 +140,32 @@ def test_improve_finds_both_of_two_effects_and_stops(rig):
     assert values["friction.coulomb_force_n"] == pytest.approx(8.0, rel=0.1)
 
 
+def interrupting(word, times):
+    """Progress of a user who stops the work at the so many-th message with a word."""
+    heard = []
+
+    def progress(message):
+        heard.append(word in message)
+        if sum(heard) == times:
+            raise KeyboardInterrupt
+
+    return progress
+
+
+def test_an_interrupt_keeps_the_rounds_that_are_finished(rig):
+    train, held_out = [bench(1, coulomb, 5.0)], [bench(2, coulomb, 5.0, 4e5)]
+    found = improve(rig, train, held_out, interrupting("round", 2))
+
+    assert found.stopped
+    assert [step.candidate.name for step in found.steps] == ["coulomb_friction"]
+    assert found.rig.added == ("coulomb_friction",)
+
+
+def test_an_interrupt_in_the_first_round_ends_the_work(rig):
+    with pytest.raises(KeyboardInterrupt):
+        improve(rig, [bench(1, coulomb)], [bench(2, coulomb)], interrupting("round", 1))
+
+
 def test_an_improved_rig_reads_back_as_the_same_model(rig):
     step = add(rig, "coulomb_friction", [bench(1, coulomb)], [bench(2, coulomb)])
     again = load_rig(rig_text(step.rig))

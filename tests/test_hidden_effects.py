@@ -10,7 +10,7 @@ import pytest
 from studies.hidden_effects import answer, confusion, public_name, recordings, user_rig
 from studies.truth.cases import read_cases
 from studies.truth.draw import HIDDEN
-from workbench.diagnosis.result import Verdict
+from workbench.diagnosis.result import DecidedBy, Verdict
 
 SEED = 1
 ALWAYS = ("chamber_leak", "coulomb_friction", "piston_leak")
@@ -38,6 +38,11 @@ def test_the_hidden_effect_comes_first_or_in_the_printed_tie(hidden):
         assert leader.candidate.name == public_name(found.case)
         assert size.value == pytest.approx(found.case.size, rel=0.25)
         assert leader.drop_validation > 0.2
+        assert droop(found).decided_by is DecidedBy.NOT_APPLICABLE  # the supply is recorded
+
+
+def droop(found):
+    return next(r for r in found.diagnosis.ranking if r.candidate.name.startswith("supply_droop"))
 
 
 def test_where_nothing_is_hidden_no_false_name_is_given():

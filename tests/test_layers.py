@@ -62,6 +62,14 @@ def test_a_folder_imports_only_what_lies_below_it(folder):
         assert ours <= ALLOWED[folder], f"{path.relative_to(ROOT)} imports {ours - ALLOWED[folder]}"
 
 
+def test_fitting_and_comparison_know_nothing_of_diagnosis():
+    for below in ("fitting", "comparison"):
+        for path in (ROOT / "workbench" / below).rglob("*.py"):
+            above = [name for name in imported(path) if name.startswith("workbench.diagnosis")]
+
+            assert not above, f"{path.relative_to(ROOT)} imports {above}"
+
+
 def test_truth_stands_on_numpy_and_the_standard_library_alone():
     below = sys.stdlib_module_names | {"numpy"}
     for path in (ROOT / "studies" / "truth").rglob("*.py"):

@@ -117,8 +117,8 @@ def improve(
     diagnoses: list[Diagnosis] = []
     current, stopped = rig, False
     for count in range(1, MOST_ROUNDS + 1):
-        progress(f"round {count}")
         try:
+            progress(f"round {count}")
             diagnosis = diagnose(current, train, validation, progress)
         except KeyboardInterrupt:
             if not steps:
