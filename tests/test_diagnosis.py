@@ -153,7 +153,8 @@ def interrupting(word, times):
 
 
 def test_an_interrupt_keeps_the_rounds_that_are_finished(rig):
-    train, held_out = [bench(1, coulomb, 5.0)], [bench(2, coulomb, 5.0, 4e5)]
+    train = [bench(1, coulomb, 5.0), bench(3, coulomb, 5.0, 1e5)]
+    held_out = [bench(2, coulomb, 5.0, 4e5)]
     found = improve(rig, train, held_out, interrupting("round", 2))
 
     assert found.stopped
