@@ -40,7 +40,7 @@ class PidSpec:
     """
 
     sample_time_s: float = 2e-3
-    stiffening: float = 16.0
+    stiffening: float = 8.0
     share_of_limit: float = 0.4
     integral_time_s: float = 1.0
     filter_s: float = 2e-3

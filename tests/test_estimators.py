@@ -11,8 +11,8 @@ from workbench.filtering import (
     consistent_start,
     correct,
     filter_pass,
-    innovations,
     predict,
+    recording_filter,
     smooth,
     smoothed,
 )
@@ -195,7 +195,8 @@ def test_innovations_of_the_true_plant_are_white_and_of_unit_size(recorded):
     truth, _, recording = recorded
     process = {VELOCITY: 0.02}
 
-    found = innovations(truth, recording, process)[:, 500:]
+    known = recording_filter(truth, recording, process_noise=process)
+    found = filter_pass(known, recording).normalised[:, 500:]
 
     assert found.std(axis=1) == pytest.approx([1.0, 1.0, 1.0], abs=0.15)
 
@@ -204,9 +205,10 @@ def test_the_smoothed_unknown_input_is_the_missing_friction(recorded):
     _, run, recording = recorded
     process = {VELOCITY: 0.1, "chamber_a.pressure_pa": 1e3, "chamber_b.pressure_pa": 1e3}
 
-    found = smooth(
+    known = recording_filter(
         servo_drive().lean(), recording, {VELOCITY: 5.0}, process_noise=process, decimate=5
     )
+    found = smooth(known, recording)
     true = -(61.7 - 44.095) * run[VELOCITY][::5] / 2.22
 
     assert np.corrcoef(found.unknown[0], true)[0, 1] > 0.85
@@ -221,7 +223,8 @@ def test_missing_samples_and_missing_outputs_are_passed_over(recorded):
     channels["slide.position_m"][200:250] = np.nan
     part = Recording("part", 1e-3, channels, noise=recording.noise).part(0, 600)
 
-    found = filter_pass(truth, part, process_noise={VELOCITY: 0.1}, decimate=2)
+    known = recording_filter(truth, part, process_noise={VELOCITY: 0.1}, decimate=2)
+    found = filter_pass(known, part)
 
     assert found.measured == ("slide.position_m", "chamber_a.pressure_pa")
     assert np.isnan(found.innovations[0, 100:125]).all()
@@ -232,10 +235,11 @@ def test_the_true_plant_is_likelier(recorded):
     truth, _, recording = recorded
     part = recording.part(0, 1000)
     process = {VELOCITY: 0.1}
-    likelihoods = [
-        filter_pass(plant, part, process_noise=process, decimate=4).log_likelihood
+    filters = [
+        recording_filter(plant, part, process_noise=process, decimate=4)
         for plant in (truth, servo_drive().lean())
     ]
+    likelihoods = [filter_pass(each, part).log_likelihood for each in filters]
 
     assert likelihoods[0] > likelihoods[1] + 10.0
 
@@ -251,10 +255,10 @@ def test_a_start_keeps_the_gas_at_its_temperature():
 def test_a_recording_without_outputs_is_an_error():
     recording = Recording("empty", 1e-3, {COMMAND: np.zeros(5)})
     with pytest.raises(ValueError, match="empty holds no output of servo_drive"):
-        filter_pass(servo_drive(), recording)
+        recording_filter(servo_drive(), recording)
 
 
 def test_an_output_without_noise_is_an_error():
     recording = Recording("bare", 1e-3, {COMMAND: np.zeros(5), OUTPUTS[0]: np.zeros(5)})
     with pytest.raises(ValueError, match=r"no measurement noise for slide\.position_m"):
-        filter_pass(servo_drive(), recording)
+        recording_filter(servo_drive(), recording)

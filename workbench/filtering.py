@@ -125,54 +125,17 @@ class FilterResult:
     log_likelihood: float
 
 
-def filter_pass(
-    plant: Plant,
-    recording: Recording,
-    unknown_inputs: Mapping[str, float] | None = None,
-    measurement_noise: Mapping[str, float] | None = None,
-    process_noise: Mapping[str, float] | None = None,
-    decimate: int = 1,
-) -> FilterResult:
-    """Extended Kalman filter over a recording; see :class:`PlantFilter` for the arguments.
+def filter_pass(found: PlantFilter, recording: Recording) -> FilterResult:
+    """Extended Kalman filter over a recording.
 
-    Measurement noise defaults to that of the recording.  NaN samples and outputs that the
-    recording does not hold are skipped; each piece starts from its own first sample.
-
-    Raises
-    ------
-    ValueError
-        If the recording holds no output of the plant, or an output has no noise.
+    NaN samples are skipped; each piece starts from its own first sample.
     """
-    found = recording_filter(
-        plant, recording, unknown_inputs, measurement_noise, process_noise, decimate
-    )
     return _joined(found, [_run(found, piece) for piece in recording.pieces])
 
 
-def smooth(
-    plant: Plant,
-    recording: Recording,
-    unknown_inputs: Mapping[str, float] | None = None,
-    measurement_noise: Mapping[str, float] | None = None,
-    process_noise: Mapping[str, float] | None = None,
-    decimate: int = 1,
-) -> FilterResult:
+def smooth(found: PlantFilter, recording: Recording) -> FilterResult:
     """:func:`filter_pass` and back again: every estimate knows the whole recording."""
-    found = recording_filter(
-        plant, recording, unknown_inputs, measurement_noise, process_noise, decimate
-    )
     return _joined(found, [_smoothed(_run(found, piece)) for piece in recording.pieces])
-
-
-def innovations(
-    plant: Plant,
-    recording: Recording,
-    process_noise: Mapping[str, float] | None = None,
-    measurement_noise: Mapping[str, float] | None = None,
-) -> np.ndarray:
-    """One-step errors over their deviation, shape (n_y, n); white where the model fits."""
-    result = filter_pass(plant, recording, None, measurement_noise, process_noise)
-    return result.normalised
 
 
 def recording_filter(
@@ -185,7 +148,14 @@ def recording_filter(
 ) -> PlantFilter:
     """The filter of a plant for the outputs and the clock of a recording.
 
-    Keep it to run several recordings or parameter values: its functions are built once.
+    Outputs that the recording does not hold are left out.  Measurement noise defaults to that of
+    the recording; see :class:`PlantFilter` for the other arguments.  Keep it to run several
+    recordings or parameter values: its functions are built once.
+
+    Raises
+    ------
+    ValueError
+        If the recording holds no output of the plant, or an output has no noise.
     """
     present = [name for name in plant.measured if name in recording.channels]
     if not present:

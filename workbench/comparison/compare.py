@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from workbench.comparison.regimes import regimes, shares
-from workbench.filtering import filter_pass
+from workbench.filtering import filter_pass, recording_filter
 from workbench.fitting.errors import SignalError
 from workbench.fitting.noise import measured_noise
 from workbench.fitting.start_states import refit_starts
@@ -171,7 +171,8 @@ def _outputs(plant: Plant, recording: Recording) -> Rows:
 def _one_step(plant: Plant, recording: Recording, noise: Mapping[str, float]) -> Rows:
     """Measured minus innovation: the outputs foretold one sample before."""
     process = dict(zip(plant.model.states, PROCESS_SHARE * plant.scale, strict=True))
-    found = filter_pass(plant, recording, None, noise, process)
+    known = recording_filter(plant, recording, measurement_noise=noise, process_noise=process)
+    found = filter_pass(known, recording)
     rows = zip(found.measured, found.innovations, strict=True)
     return {name: recording[name] - innovation for name, innovation in rows}
 

@@ -17,11 +17,12 @@ import numpy as np
 
 from workbench.comparison.regimes import regimes, shares
 from workbench.diagnosis.result import Dependence, Where
-from workbench.filtering import FilterResult, filter_pass, smooth
+from workbench.filtering import FilterResult, filter_pass, recording_filter, smooth
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.problem import Problem
 from workbench.parts import Body, Chamber
 from workbench.plant import Plant
+from workbench.plant_filter import PlantFilter
 from workbench.recording import Recording
 
 GRID_S = 5e-3
@@ -53,17 +54,21 @@ def locate(problem: Problem, recordings: Sequence[Recording]) -> Where | None:
     noise = dict(zip(plant.measured, problem.base.windows.noise, strict=True))
     decimate = max(round(GRID_S / recording.sample_time_s), 1)
     always = {s: PROCESS[k] for s in plant.state_list if (k := s.rpartition(".")[2]) in PROCESS}
-    plain = filter_pass(plant, recording, {}, noise, always, decimate).log_likelihood
+
+    def lacking(unknown: dict[str, float]) -> PlantFilter:
+        return recording_filter(plant, recording, unknown, noise, always, decimate)
+
+    plain = filter_pass(lacking({}), recording).log_likelihood
     gains = {}
     for suspect in suspects:
         runs = {
-            q: filter_pass(plant, recording, {suspect.state: q}, noise, always, decimate)
+            q: filter_pass(lacking({suspect.state: q}), recording)
             for q in INTENSITIES[suspect.state.rpartition(".")[2]]
         }
         best = max(runs, key=lambda q: runs[q].log_likelihood)
         gains[suspect] = (runs[best].log_likelihood - plain, best)
     worst = max(gains, key=lambda s: gains[s][0])
-    result = smooth(plant, recording, {worst.state: gains[worst][1]}, noise, always, decimate)
+    result = smooth(lacking({worst.state: gains[worst][1]}), recording)
     term = result.unknown[0] * worst.factor
     return Where(
         balance=worst.balance,
