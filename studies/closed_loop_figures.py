@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from linearize.standard import POSITION, PRESSURES
+from linearize.standard import POSITION
 from studies.closed_loop_check import Check
 
 if TYPE_CHECKING:
@@ -24,7 +24,6 @@ def draw_position(axes: Axes, records: dict[str, LoopRecord]) -> None:
         recording = record.recording
         axes.plot(recording.time_s, 1e3 * recording[POSITION], **style, label=name)
     axes.set_ylabel("position (mm)")
-    axes.legend(loc="lower right")
 
 
 def draw_error(axes: Axes, records: dict[str, LoopRecord], largest_m: float = 1e-3) -> None:
@@ -47,17 +46,6 @@ def draw_command(axes: Axes, records: dict[str, LoopRecord]) -> None:
     axes.set_xlabel("time (s)")
 
 
-def draw_pressures(axes: Axes, record: LoopRecord) -> None:
-    """Both pressures of one run with their estimates."""
-    recording = record.recording
-    for style, name in zip(LINES, PRESSURES, strict=False):
-        axes.plot(recording.time_s, 1e-5 * recording[name], style, label=name.split(".")[0])
-        axes.plot(recording.time_s, 1e-5 * record.estimates[name], color="0.6", linewidth=0.5)
-    axes.set_ylabel("pressure (bar)")
-    axes.set_xlabel("time (s)")
-    axes.legend(loc="lower right")
-
-
 def check_figures(check: Check) -> dict[str, Figure]:
     """One figure per scenario, by file name without ending: position, error and command."""
     from matplotlib.figure import Figure
@@ -74,6 +62,8 @@ def check_figures(check: Check) -> dict[str, Figure]:
         draw_position(position, records)
         draw_error(error, records)
         draw_command(command, records)
+        handles, labels = position.get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper center", ncols=4)
         figures[f"closed_loop_{scenario}"] = figure
     return figures
 

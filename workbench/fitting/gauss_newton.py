@@ -67,7 +67,9 @@ class Fit:
     @property
     def residual(self) -> np.ndarray:
         """Weighted residuals of the recorded samples, shape (n_y, n_windows, L)."""
-        return self.windows.residuals([self.plant], self.point.starts)[0]
+        n_y, n, length = self.windows.measured.shape
+        rows = self.derivatives.residual[:, : n_y * length]
+        return rows.reshape(n, n_y, length).transpose(1, 0, 2)
 
 
 def fit_windows(
