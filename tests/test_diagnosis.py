@@ -116,6 +116,44 @@ def test_what_a_diagnosis_puts_first_can_be_accepted_as_it_was_fitted(rig, found
     assert step.drop_train == found.ranking[0].drop_train
 
 
+def test_a_size_far_beyond_typical_is_found(rig):
+    """300 N are 14 typical constant forces."""
+    step = add(rig, "constant_force", [bench(1, nothing, 300.0)], [bench(2, nothing, 300.0, 4e5)])
+
+    assert step.fit.converged
+    assert step.rig.plant.values["constant_force.force_n"] == pytest.approx(-300.0, rel=1e-3)
+
+
+def test_a_standard_deviation_says_how_far_sizes_scatter(rig):
+    name = "friction.coulomb_force_n"
+    steps = [
+        add(rig, "coulomb_friction", [bench(k, coulomb)], [bench(k + 10, coulomb, gauge_pa=4e5)])
+        for k in range(1, 6)
+    ]
+    scatter = np.std([step.rig.plant.values[name] for step in steps], ddof=1)
+
+    for step in steps:
+        assert scatter / 5 < step.rig.deviations[name] < 5 * scatter
+
+
+def test_the_shape_that_the_scan_found_is_kept_by_the_refit(rig):
+    def stribeck(v):
+        return coulomb(v) + 6.0 * np.sign(v) * np.exp(-((v / 0.01) ** 2))
+
+    train, held_out = [bench(1, stribeck), bench(3, stribeck)], [bench(2, stribeck)]
+    step = add(add(rig, "coulomb_friction", train, held_out).rig, "stiction", train, held_out)
+
+    assert step.rig.plant.values["friction.stribeck_velocity_m_s"] == 0.01
+    assert step.rig.plant.values["friction.stiction_excess_n"] == pytest.approx(6.0, rel=0.15)
+
+
+def test_adding_without_validation_warns_and_improving_refuses(rig):
+    with pytest.warns(UserWarning, match="no validation recording"):
+        add(rig, "coulomb_friction", [bench(1, coulomb)])
+    with pytest.raises(ValueError, match="needs a validation recording"):
+        improve(rig, [bench(1, coulomb)], [])
+
+
 def test_an_unknown_effect_is_refused_with_the_nearest_name(rig):
     with pytest.raises(KeyError, match="did you mean coulomb_friction"):
         add(rig, "coulomb_fricton", [bench(1, coulomb)])
@@ -158,6 +196,7 @@ def test_an_interrupt_keeps_the_rounds_that_are_finished(rig):
     found = improve(rig, train, held_out, interrupting("round", 2))
 
     assert found.stopped
+    assert len(found.budget) == 2 and found.budget[1][1] < found.budget[0][1]
     assert [step.candidate.name for step in found.steps] == ["coulomb_friction"]
     assert found.rig.added == ("coulomb_friction",)
 

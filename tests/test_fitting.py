@@ -6,6 +6,7 @@ import pytest
 from workbench.fitting.gauss_newton import fit_windows
 from workbench.fitting.noise import measured_noise
 from workbench.fitting.start_states import refit_starts
+from workbench.fitting.starts import guessed_states
 from workbench.fitting.unknowns import Unknowns, nominal_unknowns
 from workbench.fitting.windows import cut_windows
 from workbench.plants import servo_drive
@@ -67,7 +68,34 @@ def test_missing_samples_have_no_weight(plant, recording):
     windows = cut_windows(plant, [Recording("holes", 1e-3, channels)], NOISE)
 
     assert windows.count == 3 * 2000 - 50
-    assert np.isfinite(refit_starts(windows).chi2)
+    assert refit_starts(windows).chi2 / windows.count == pytest.approx(1.0, abs=0.15)
+
+
+def test_start_states_near_a_hole_claim_no_more_than_they_know(plant, recording):
+    channels = {**recording.channels, "slide.position_m": recording["slide.position_m"].copy()}
+    channels["slide.position_m"][480:650] = np.nan
+    whole = guessed_states(plant, recording)[0]
+    guess, deviation = guessed_states(plant, Recording("holes", 1e-3, channels))
+    off = np.abs(guess - whole) / np.maximum(deviation, 1e-12)
+
+    assert off.max() < 5.0
+    assert (deviation[0, 500:640] > 0.01).all() and deviation[0, 300] < 1e-4
+
+
+def test_recordings_of_different_sample_times_are_refused(plant, recording):
+    channels = {name: values[::2] for name, values in recording.channels.items()}
+    with pytest.raises(ValueError, match="slow has a sample every 2 ms and sines every 1 ms"):
+        cut_windows(plant, [recording, Recording("slow", 2e-3, channels)], NOISE)
+
+
+def test_a_delay_of_zero_is_no_delay(recording):
+    late = servo_drive().with_values({"command_delay.delay_s": 5e-3}).lean()
+    windows = cut_windows(late, [recording], NOISE)
+    plants = [late.with_values({"command_delay.delay_s": d}) for d in (0.0, 1e-9, 5e-3)]
+    at_zero, next_to_it, at_five = (windows.simulated([p], windows.start) for p in plants)
+
+    assert np.allclose(at_zero, next_to_it, rtol=1e-6)
+    assert not np.allclose(at_zero, at_five, rtol=1e-6)
 
 
 def test_a_fit_brings_a_wrong_mass_back(plant, recording):

@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from workbench.diagnosis.judge import (
+    CLEARLY_LESS,
     HELD_OUT_REASON,
     SHARE_REASON,
     predicts,
@@ -36,7 +37,8 @@ ALWAYS_REFITTED = 2
 SHIFTS_REFITTED = 2  # parameters that leave their priors
 WORTH_A_REFIT = 0.25  # of the best drop of the scan, for shifts of the best refit
 CERTAIN_SHARE = 0.5  # an accepted candidate above it needs no comparison with an empirical law
-LAW_MARGIN = 0.15  # by how much of the misfit a law must beat the catalogue
+
+WEAK_EVIDENCE = "no validation recording: the last third is held out, which is weak evidence"
 
 Progress = Callable[[str], None]
 
@@ -66,7 +68,7 @@ def diagnose(
     held_out = bool(validation)
     if not held_out:
         train, validation = split(train)
-        warnings = ("no validation recording: the last third is held out, which is weak evidence",)
+        warnings = (WEAK_EVIDENCE,)
     progress("prior fit")
     problem = pose(rig, train, validation, most_windows)
     if not problem.base.converged:
@@ -84,6 +86,8 @@ def diagnose(
     law = _law(problem, ranking, where.balance if where else None, progress)
     verdict = _verdict(ranking, law, held_out)
     best = next((r for r in refits if ranking and r.candidate == ranking[0].candidate), None)
+    if best and not best.fit.converged:
+        warnings += (f"the refit with {best.candidate.name} did not converge: its size may be off",)
     return Diagnosis(
         rig_name=rig.name,
         verdict=verdict,
@@ -161,11 +165,15 @@ def _ranking(
     rest = [_shifted(shift) for shift in moved if shift.candidate.name not in rows]
     rest += [_scanned_row(problem, p) for p in profiles if p.candidate.name not in rows]
     rest.sort(key=lambda row: -row.drop_train)
-    return (*followed, *refused, *rest, *_not_applicable(problem))
+    asked = (*followed, *refused, *rest)
+    return (*asked, *_not_asked(problem, {row.candidate.name for row in asked}))
 
 
-def _not_applicable(problem: Problem) -> list[Ranked]:
-    """Causes of the plant that have no place where the recording measures what they produce."""
+def _not_asked(problem: Problem, asked: set[str]) -> list[Ranked]:
+    """Causes of the rig's plant without a row yet: measured here, or there already.
+
+    Where the recording measures what a cause produces, the cause has no place.
+    """
     here = problem.whole.candidates
     nothing = float("nan")
     return [
@@ -179,10 +187,10 @@ def _not_applicable(problem: Problem) -> list[Ranked]:
             compensable=nothing,
             decided_by=DecidedBy.NOT_APPLICABLE,
             accepted=False,
-            reasons=("not applicable: measured",),
+            reasons=("there already" if name in here else "not applicable: measured",),
         )
         for name, candidate in problem.rig.plant.candidates.items()
-        if name not in here
+        if name not in asked
     ]
 
 
@@ -257,8 +265,8 @@ def _law(
     progress("empirical law")
     law = empirical_law(problem, balance)
     followed = [r.drop_train for r in ranking if r.fit is not None and predicts_row(r)]
-    best = max(followed, default=0.0)
-    return law if law and law.drop_train > best + LAW_MARGIN else None
+    left = 1.0 - max(followed, default=0.0)
+    return law if law and 1.0 - law.drop_train < (1.0 - CLEARLY_LESS) * left else None
 
 
 def _verdict(ranking: tuple[Ranked, ...], law: Law | None, held_out: bool) -> Verdict:
@@ -281,7 +289,9 @@ def _sentence(verdict: Verdict, ranking: tuple[Ranked, ...], law: Law | None) ->
     if verdict is Verdict.FOUND:
         return f"{name} is missing: it removes {share} of the misfit beyond noise"
     if verdict is Verdict.TIE:
-        others = ", ".join(leader.tied_with) if leader and leader.tied_with else "no other"
+        if not leader or not leader.tied_with:
+            return f"{name} ({share} of the misfit), on no more than one recording"
+        others = ", ".join(leader.tied_with)
         return f"{name} ({share} of the misfit), not to be told here from {others}"
     if verdict is Verdict.SMALL_PROXY:
         return f"{name} explains {share} of the misfit and may stand for something else"

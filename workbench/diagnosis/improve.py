@@ -8,10 +8,11 @@ Source: diagnosis.md 1.10 (forward selection with a new scan after each acceptan
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from workbench.diagnosis.diagnose import Progress, diagnose, silent
+from workbench.diagnosis.diagnose import WEAK_EVIDENCE, Progress, diagnose, silent
 from workbench.diagnosis.refit import refit
 from workbench.diagnosis.result import Diagnosis
 from workbench.diagnosis.scan import scan
@@ -49,6 +50,7 @@ class Addition:
     drop_validation: float
     parameters: tuple[Moved, ...]
     fit: Fit = field(repr=False)
+    validation_fit: Fit | None = field(repr=False)
 
 
 @dataclass(frozen=True)
@@ -83,6 +85,7 @@ def add(
         If the effect is there already, or only a shift of a parameter that is fitted anyway.
     """
     if not validation:
+        warnings.warn(WEAK_EVIDENCE, stacklevel=2)
         train, validation = split(train)
     plant = rig.fit_for(train[0])
     require([name], plant.candidates, plant.name)
@@ -102,7 +105,7 @@ def add(
 def improve(
     rig: Rig,
     train: Sequence[Recording],
-    validation: Sequence[Recording] = (),
+    validation: Sequence[Recording],
     progress: Progress = silent,
 ) -> Improvement:
     """Diagnose and add until nothing in the catalogue earns its place.
@@ -110,9 +113,14 @@ def improve(
     The effect added is the first of the ranking where it passes every criterion, also where an
     empirical law would do better: a physical effect comes first.  An interrupt after the first
     finished round ends it there, with what is finished.
+
+    Raises
+    ------
+    ValueError
+        Without a validation recording: what is added again and again must hold elsewhere too.
     """
     if not validation:
-        train, validation = split(train)
+        raise ValueError("improve needs a validation recording: another manoeuvre, held out")
     steps: list[Addition] = []
     diagnoses: list[Diagnosis] = []
     current, stopped = rig, False
@@ -134,7 +142,8 @@ def improve(
         steps.append(accept(current, diagnosis))
         current = _freed(current, best.candidate, best.fit)
     final = steps[-1].rig if steps else rig
-    return Improvement(final, tuple(steps), tuple(diagnoses), _budget(diagnoses), stopped)
+    budget = _budget(diagnoses, steps)
+    return Improvement(final, tuple(steps), tuple(diagnoses), budget, stopped)
 
 
 def accept(rig: Rig, diagnosis: Diagnosis) -> Addition:
@@ -174,7 +183,7 @@ def _freed(rig: Rig, candidate: Candidate, fit: Fit) -> Rig:
     ours, values = rig.plant.values, fit.plant.values
     unknowns = fit.unknowns
     free = [n for n, w in zip(unknowns.names, unknowns.precision, strict=True) if w < 1.0]
-    found = {name: values[name] for name in free if name in ours}
+    found = {name: values[name] for name in (*free, *unknowns.held) if name in ours}
     if not _is_new(rig, candidate):
         return replace(
             rig, plant=rig.plant.with_values(found), deviations=_loosened(rig, fit, free)
@@ -215,6 +224,7 @@ def _addition(
         drop_validation=unseen,
         parameters=moved_parameters(fit),
         fit=fit,
+        validation_fit=held_out,
     )
 
 
@@ -235,15 +245,17 @@ def moved_parameters(fit: Fit) -> tuple[Moved, ...]:
     )
 
 
-def _budget(diagnoses: Sequence[Diagnosis]) -> tuple[tuple[str, float, float], ...]:
-    """Error of the base of every round: each stands for what the round before accepted."""
-    rows = []
-    label = "as it came"
-    for diagnosis in diagnoses:
-        rows.append((label, _per_sample(diagnosis.base), _per_sample(diagnosis.base_validation)))
-        if diagnosis.ranking:
-            label = f"+ {diagnosis.ranking[0].candidate.name}"
-    return tuple(rows)
+def _budget(
+    diagnoses: Sequence[Diagnosis], steps: Sequence[Addition]
+) -> tuple[tuple[str, float, float], ...]:
+    """Error as it came and after every step: as the next round found it, or as it was fitted."""
+    labels = ["as it came", *(f"+ {step.candidate.name}" for step in steps)]
+    bases = [(each.base, each.base_validation) for each in diagnoses]
+    fits = [*bases, *((step.fit, step.validation_fit) for step in steps[len(bases) - 1 :])]
+    return tuple(
+        (label, _per_sample(fit), _per_sample(held_out))
+        for label, (fit, held_out) in zip(labels, fits, strict=False)
+    )
 
 
 def _per_sample(fit: Fit | None) -> float:

@@ -87,7 +87,7 @@ def _size_reasons(refit: Refit) -> list[str]:
         reasons.append("its size is negligible")
     elif abs(size - null) < DISTINCT * refit.size[name].deviation:
         reasons.append("its size is not distinct from none")
-    if abs(size - null) > 0 and size in (known.lower, known.upper) and known.upper < 1.0:
+    if abs(size - null) > 0 and size in (known.lower, known.upper) and size != known.typical:
         reasons.append("its size is at a bound")
     return reasons
 

@@ -27,7 +27,7 @@ from workbench.plant import Candidate
 STARTS = 2  # sizes of the scan that are tried
 SHARES = (1.0, 0.5, 0.0)  # of the linear step of the nuisances that goes with each
 FIRST_ITERATIONS = 4  # before other strengths are probed
-ITERATIONS = 5
+ITERATIONS = 10
 PROBES = (0.4, 0.6, 0.8, 0.9, 1.15, 1.4, 1.8, 2.5)  # factors on a fitted strength
 
 
@@ -53,7 +53,7 @@ def refit(problem: Problem, profile: Profile) -> Refit:
     if not any(member.name == candidate.member for member in windows.plant.members):
         needed = [c.member for c in problem.added] + [candidate.member]
         windows = windows.with_plant(staged(problem.whole, *needed))
-    unknowns = problem.unknowns(windows.plant, candidate)
+    unknowns = _with_shape(problem, problem.unknowns(windows.plant, candidate), profile)
     tried = []
     for points in _starts(problem, windows, unknowns, profile):
         start = best_start(windows, unknowns, points)
@@ -64,7 +64,8 @@ def refit(problem: Problem, profile: Profile) -> Refit:
     fit = fit_windows(windows, unknowns, probed, ITERATIONS)
     if fit.cost > problem.base.cost:  # a poor start: go on from the base, where it is absent
         values = {**windows.plant.values, **problem.base.plant.values}
-        absent = Point(unknowns.clipped(unknowns.scaled(values)), carried(problem.base, windows))
+        starts = carried(problem.base.point.starts, problem.base.windows, windows)
+        absent = Point(unknowns.clipped(unknowns.scaled(values)), starts)
         fit = fit_windows(windows, unknowns, absent, ITERATIONS)
     validation = problem.validated(fit)
     return Refit(
@@ -75,6 +76,13 @@ def refit(problem: Problem, profile: Profile) -> Refit:
         drop_train=_drop(problem.base, fit),
         drop_validation=held_out_drop(problem.base_validation, validation),
     )
+
+
+def _with_shape(problem: Problem, unknowns: Unknowns, profile: Profile) -> Unknowns:
+    """Shapes that no fit moves stay as the best size of the scan had them."""
+    settled = {*unknowns.names, *problem.rig.fixed}
+    shape = {k: v for k, v in profile.trials[0].values.items() if k not in settled}
+    return replace(unknowns, held={**unknowns.held, **shape})
 
 
 def _nearby(
@@ -173,7 +181,7 @@ def _starts(
     may have moved its parameters far to imitate what is missing.
     """
     base = problem.base
-    starts = carried(base, windows)
+    starts = carried(base.point.starts, base.windows, windows)
 
     def point(t: np.ndarray, trial: Trial) -> Point:
         nominal = base.unknowns.values(base.unknowns.clipped(t))

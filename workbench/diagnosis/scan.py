@@ -28,6 +28,7 @@ import numpy as np
 
 from workbench.fitting.linearised import Linearised, Normal, Point, linearise, normal_equations
 from workbench.fitting.problem import staged
+from workbench.fitting.start_states import carried
 from workbench.fitting.unknowns import Unknowns
 from workbench.fitting.windows import Windows
 from workbench.plant import Candidate, Plant
@@ -152,7 +153,7 @@ def scan(
     profiles = []
     for needed, members in groups.items():
         richer = windows.with_plant(staged(whole, *needed)) if needed else windows
-        starts = _starts(windows, richer, point)
+        starts = carried(point.starts, windows, richer)
         trials = [
             (candidate, change)
             for candidate in members
@@ -203,12 +204,3 @@ def _profiles(
 def _needed(plant: Plant, candidate: Candidate) -> tuple[str, ...]:
     """The members a candidate needs that bring states the plant does not have."""
     return () if any(m.name == candidate.member for m in plant.members) else (candidate.member,)
-
-
-def _starts(windows: Windows, richer: Windows, point: Point) -> np.ndarray:
-    """Start states of the richer plant, those of the point where it has them."""
-    starts = richer.start.copy()
-    names = list(richer.plant.state_list)
-    for row, name in enumerate(windows.plant.state_list):
-        starts[names.index(name)] = point.starts[row]
-    return starts

@@ -10,7 +10,7 @@ import numpy as np
 from workbench.fitting.errors import Errors, errors_of
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.posterior import fitted_rig, posterior_covariance
-from workbench.fitting.problem import Problem, pose, split
+from workbench.fitting.problem import Problem, pose
 from workbench.fitting.start_states import refit_starts
 from workbench.plant import require
 from workbench.recording import Recording
@@ -59,7 +59,8 @@ def fit(
 ) -> FitReport:
     """Fit what is uncertain in a rig, within its priors.
 
-    ``only`` restricts the fit to the named parameters (full names); all others stay.
+    ``only`` restricts the fit to the named parameters (full names); all others stay.  Everything
+    in ``train`` is fitted: nothing is held out unless it comes as ``validation``.
 
     Raises
     ------
@@ -73,8 +74,6 @@ def fit(
         held = replace(rig, fixed=rig.fixed | others)
     else:
         held = rig
-    if not validation:
-        train, validation = split(train)
     progress("fit")
     problem = pose(held, train, validation)
     before = _untouched(problem)

@@ -27,6 +27,7 @@ from workbench.fitting.windows import Windows
 from workbench.plant import Plant
 
 LONGEST_STEP = 4.0  # of a scaled unknown in one step: beyond, the plant may be another one
+LONGEST_FREE_STEP = 40.0  # of one without a prior, which is counted in tenths of its typical size
 LONGEST_START_STEP = 8.0  # of a start state, in its deviations
 DAMPINGS = (0.0, 0.3, 3.0, 30.0)
 AGAIN = 0.02  # relative fall of the cost above which derivatives are used once more
@@ -150,10 +151,11 @@ def _damped_steps(
     """Gauss-Newton steps of unknowns and start states, one per damping."""
     normal = normal_equations(at, unknowns, counted)
     H, g = normal.hessian, normal.gradient
+    longest = np.where(unknowns.precision < 1.0, LONGEST_FREE_STEP, LONGEST_STEP)
     steps = []
     for damping in DAMPINGS:
         dt = -np.linalg.solve(H + damping * np.diag(np.diag(H)), g) if len(g) else np.zeros(0)
-        dt = np.clip(dt, -LONGEST_STEP, LONGEST_STEP)
+        dt = np.clip(dt, -longest, longest)
         rest = at.residual + (at.parameters @ dt)
         back = (at.basis.transpose(0, 2, 1) @ rest[:, :, None])[:, :, 0]
         dx = -np.linalg.solve(at.triangle, back[:, :, None])[:, :, 0] if back.shape[1] else back

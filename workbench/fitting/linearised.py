@@ -107,6 +107,17 @@ def moved(windows: Windows, unknowns: Unknowns, at: Linearised, point: Point) ->
     return replace(at, point=point, residual=np.concatenate([rows, away], axis=1))
 
 
+def rescaled(at: Linearised, before: Windows, after: Windows) -> Linearised:
+    """The same derivatives on windows that differ in their scales alone."""
+    ratio = np.repeat((before.scale / after.scale).T, before.length, axis=1)
+    ratio = np.concatenate([ratio, np.ones((len(ratio), at.triangle.shape[1]))], axis=1)
+    basis, triangle = at.basis, at.triangle
+    if triangle.shape[1]:
+        basis, triangle = np.linalg.qr(ratio[:, :, None] * (basis @ triangle))
+    residual, parameters = ratio * at.residual, ratio[:, :, None] * at.parameters
+    return Linearised(at.point, residual, parameters, basis, triangle)
+
+
 def borrowed(
     near: Linearised, known: Unknowns, windows: Windows, unknowns: Unknowns, point: Point
 ) -> Linearised:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from workbench.fitting.gauss_newton import Fit
-from workbench.fitting.linearised import normal_equations
+from workbench.fitting.linearised import normal_equations, rescaled
 from workbench.rig import Rig
 
 
@@ -21,15 +21,22 @@ def posterior_deviation(fit: Fit) -> np.ndarray:
 
 
 def posterior_covariance(fit: Fit) -> np.ndarray:
-    """Covariance of the scaled unknowns from the curvature of the cost, shape (n_p, n_p)."""
-    normal = normal_equations(fit.derivatives, fit.unknowns)
-    return np.linalg.inv(normal.hessian) if len(fit.unknowns) else np.zeros((0, 0))
+    """Covariance of the scaled unknowns from the curvature of the cost, shape (n_p, n_p).
+
+    Residuals are weighted by the error model of this very fit: the scales that it was fitted with
+    may belong to a plant that lacked something and was far worse.
+    """
+    if not len(fit.unknowns):
+        return np.zeros((0, 0))
+    at = rescaled(fit.derivatives, fit.windows, fit.windows.rescaled(fit.residual))
+    return np.linalg.inv(normal_equations(at, fit.unknowns).hessian)
 
 
 def fitted_rig(rig: Rig, fit: Fit, added: Sequence[str], note: str = "") -> Rig:
     """The rig at fitted values with their standard deviations, and one note more."""
     ours = rig.plant.values
-    values = {n: v for n, v in fit.plant.values.items() if n in ours and n in fit.unknowns.names}
+    found = fit.unknowns.values(fit.point.t)
+    values = {name: value for name, value in found.items() if name in ours}
     deviations = dict(zip(fit.unknowns.names, posterior_deviation(fit).tolist(), strict=True))
     return replace(
         rig,

@@ -26,16 +26,16 @@ def refit_starts(
     nothing = Unknowns((), *(np.zeros(0) for _ in range(5)), held=values or {})
     start, at = None, None
     if near is not None:
-        start = Point(np.zeros(0), carried(near, windows))
+        start = Point(np.zeros(0), carried(near.point.starts, near.windows, windows))
         at = near.derivatives if near.windows is windows else None
         at = moved(windows, nothing, at, start) if at else None
     return fit_windows(windows, nothing, start, iterations, at)
 
 
-def carried(near: Fit, windows: Windows) -> np.ndarray:
-    """Start states of a fit for windows of a plant with more states, shape (n_x, n_windows)."""
-    starts = windows.start.copy()
+def carried(starts: np.ndarray, near: Windows, windows: Windows) -> np.ndarray:
+    """Start states of windows for those of a plant with more states, shape (n_x, n_windows)."""
+    found = windows.start.copy()
     names = list(windows.plant.state_list)
-    for row, name in enumerate(near.windows.plant.state_list):
-        starts[names.index(name)] = near.point.starts[row]
-    return starts
+    for row, name in enumerate(near.plant.state_list):
+        found[names.index(name)] = starts[row]
+    return found

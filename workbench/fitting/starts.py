@@ -8,10 +8,16 @@ the energy balance read backwards, sample by sample,
 
 with recorded p and V and the plant's own heat flow Q.  Errors fade with the wall's time constant.
 
+Short holes in a channel are bridged by straight lines.  In long ones, and next to them, nothing is
+known of any state: they keep their guess with the deviation of a state that is not measured, and
+the masses are followed anew behind them, as at the start of a piece.
+
 Source: physics.md 1.2 level 1, solved for the mass flow.
 """
 
 from __future__ import annotations
+
+from itertools import pairwise
 
 import casadi as ca
 import numpy as np
@@ -24,16 +30,18 @@ from workbench.recording import Recording
 SMOOTHING_SAMPLES = 15  # of the parabola through recorded values that gives their slope
 CHUNK = 500  # samples that are followed in one call
 OBSERVED_MASS_SHARE = 0.01  # standard deviation of a gas mass that was followed
+RESUMED_MASS_SHARE = 0.05  # the same where it was lost from sight: 15 K, in full motion
 
 
 def guessed_states(plant: Plant, recording: Recording) -> np.ndarray:
     """States at every sample and their standard deviations from the recording, (2, n_x, n)."""
-    n = len(recording)
-    seen = dict(recording.channels)
+    n, starts = len(recording), recording.starts
+    seen = {name: bridged(values, starts) for name, values in recording.channels.items()}
     for name in list(seen):
         speed = name.replace("position_m", "velocity_m_s").replace("angle_rad", "rate_rad_s")
         if speed != name and speed not in seen:
-            seen[speed] = slope(seen[name], recording.sample_time_s, recording.starts)
+            seen[speed] = slope(seen[name], recording.sample_time_s, starts)
+    blind = long_holes(plant, recording)
     rows = []
     for member in plant.members:
         guesses = member.guess(seen)
@@ -41,14 +49,39 @@ def guessed_states(plant: Plant, recording: Recording) -> np.ndarray:
             value, deviation = guesses.get(state.quantity, (float(state.initial), state.scale))
             values = np.broadcast_to(np.asarray(value, dtype=float), (n,))
             values = np.where(np.isfinite(values), values, float(state.initial))
-            rows.append(np.stack([values, np.full(n, deviation)]))
+            rows.append(np.stack([values, np.where(blind, state.scale, deviation)]))
     if not rows:
         return np.zeros((2, 0, n))
     states = np.stack(rows, axis=1)
     for part in plant.parts:
         if isinstance(part, Chamber) and f"{part.name}.pressure_pa" in seen:
-            _follow_gas(plant, part, recording, states)
+            _follow_gas(plant, part, recording, states, blind)
     return states
+
+
+def bridged(values: np.ndarray, starts: tuple[int, ...]) -> np.ndarray:
+    """A channel with straight lines over its holes, piece by piece; the ends are held, (n,)."""
+    found = values.copy()
+    for first, last in zip(starts, (*starts[1:], len(values)), strict=True):
+        piece, seen = values[first:last], np.isfinite(values[first:last])
+        if seen.any() and not seen.all():
+            samples = np.arange(len(piece))
+            found[first:last] = np.interp(samples, samples[seen], piece[seen])
+    return found
+
+
+def long_holes(plant: Plant, recording: Recording) -> np.ndarray:
+    """True inside and next to holes longer than slopes can bridge, in any channel in use, (n,)."""
+    inputs = (signal.name for signal in (*plant.commands, *plant.measured_inputs))
+    used = [name for name in (*plant.measured, *inputs) if name in recording.channels]
+    blind = np.zeros(len(recording), dtype=bool)
+    for name in used:
+        missing = np.concatenate([[False], ~np.isfinite(recording[name]), [False]])
+        edges = np.flatnonzero(np.diff(missing.astype(int)))
+        for first, last in edges.reshape(-1, 2):
+            if last - first > SMOOTHING_SAMPLES:
+                blind[max(first - SMOOTHING_SAMPLES // 2, 0) : last + SMOOTHING_SAMPLES // 2] = True
+    return blind
 
 
 def slope(values: np.ndarray, sample_time_s: float, starts: tuple[int, ...]) -> np.ndarray:
@@ -59,12 +92,15 @@ def slope(values: np.ndarray, sample_time_s: float, starts: tuple[int, ...]) -> 
     for first, last in zip(starts, (*starts[1:], len(values)), strict=True):
         width = min(SMOOTHING_SAMPLES, (last - first - 1) // 2 * 2 + 1)
         if width >= 3:
-            piece = np.nan_to_num(values[first:last])
-            rate[first:last] = savgol_filter(piece, width, 2, deriv=1, delta=sample_time_s)
+            rate[first:last] = savgol_filter(
+                np.nan_to_num(values[first:last]), width, 2, deriv=1, delta=sample_time_s
+            )
     return rate
 
 
-def _follow_gas(plant: Plant, chamber: Chamber, recording: Recording, states: np.ndarray) -> None:
+def _follow_gas(
+    plant: Plant, chamber: Chamber, recording: Recording, states: np.ndarray, blind: np.ndarray
+) -> None:
     """Write the followed mass of one chamber, and its deviation, into the guessed states."""
     model, dt = plant.model, recording.sample_time_s
     names = list(model.states)
@@ -72,16 +108,30 @@ def _follow_gas(plant: Plant, chamber: Chamber, recording: Recording, states: np
     pressure = names.index(f"{chamber.name}.pressure_pa")
     rate = slope(states[0, pressure], dt, recording.starts)
     u, d = (
-        np.array([recording[n] for n in group]).reshape(len(group), len(recording))
+        np.array([bridged(recording[n], recording.starts) for n in group]).reshape(
+            len(group), len(recording)
+        )
         for group in (model.commands, model.measured_inputs)
     )
     p = plant.nominal[2]
     flow = _flow_from_energy(plant, chamber, row)
-    for first, last in zip(recording.starts, (*recording.starts[1:], len(recording)), strict=True):
+    for first, last in _seen_pieces(recording, blind):
         columns = (v[:, first:last] for v in (states[0], rate[None, :], u, d))
         masses = _folded(flow, states[0, row, first], [*columns], p, dt)
         states[0, row, first + 1 : last] = masses[:-1]
-        states[1, row, first:last] = OBSERVED_MASS_SHARE * np.median(masses)
+        share = OBSERVED_MASS_SHARE if first == 0 else RESUMED_MASS_SHARE
+        states[1, row, first:last] = share * np.median(masses)
+
+
+def _seen_pieces(recording: Recording, blind: np.ndarray) -> list[tuple[int, int]]:
+    """First and last sample of every stretch without a gap or a long hole."""
+    new = np.diff(np.concatenate([[True], blind, [True]]).astype(int))
+    begins, ends = np.flatnonzero(new == -1), np.flatnonzero(new == 1)
+    return [
+        (int(first), int(last))
+        for begin, end in zip(begins, ends, strict=True)
+        for first, last in pairwise([begin, *(s for s in recording.starts if begin < s < end), end])
+    ]
 
 
 def _folded(

@@ -34,6 +34,7 @@ WINDOW_S = 0.2
 MOST_WINDOWS = 1500  # five minutes: beyond, a fit learns little and takes long
 UNSEEN_PENALTY = 1e3  # residual in standard deviations of a sample that could not be simulated
 THREADS = 2
+SAME_CLOCK = 1e-4  # relative difference of sample times that counts as none
 
 
 @dataclass(frozen=True)
@@ -168,16 +169,21 @@ class Windows:
 
     def _inputs(self, plant: Plant) -> tuple[np.ndarray, np.ndarray]:
         """Commands and measured inputs of all windows side by side, (n_u, n L) and (n_d, n L)."""
-        timing = tuple(
-            m for m in plant.effects if not m.absent and type(m).resample is not Effect.resample
-        )
-        if timing:
+        if any(_in_time(effect) and not effect.absent for effect in plant.effects):
             return cut_inputs(plant, self.recordings, self.firsts, self.length)
         return self._plain_inputs
 
     @cached_property
     def _plain_inputs(self) -> tuple[np.ndarray, np.ndarray]:
-        return cut_inputs(self.plant.lean(), self.recordings, self.firsts, self.length)
+        """Those of a plant without any cause in time."""
+        effects = tuple(effect for effect in self.plant.effects if not _in_time(effect))
+        plain = replace(self.plant, effects=effects)
+        return cut_inputs(plain, self.recordings, self.firsts, self.length)
+
+
+def _in_time(effect: Effect) -> bool:
+    """True for a cause that acts on the sampled commands: delay, pause."""
+    return type(effect).resample is not Effect.resample
 
 
 def cut_windows(
@@ -194,9 +200,10 @@ def cut_windows(
     Raises
     ------
     ValueError
-        If no recording holds a whole window.
+        If no recording holds a whole window, or their sample times differ.
     """
     recordings = tuple(recordings)
+    _one_clock(recordings)
     length = max(round(window_s / recordings[0].sample_time_s), 2)
     firsts = thinned(tuple(window_firsts(recording, length) for recording in recordings), most)
     if not any(firsts):
@@ -216,3 +223,15 @@ def cut_windows(
     return Windows(
         plant, recordings, firsts, length, measured, sigma, scale, errors, start, deviation
     )
+
+
+def _one_clock(recordings: tuple[Recording, ...]) -> None:
+    """Refuse recordings of different sample times: windows share one simulation."""
+    first = recordings[0]
+    for other in recordings[1:]:
+        if abs(other.sample_time_s - first.sample_time_s) > SAME_CLOCK * first.sample_time_s:
+            raise ValueError(
+                f"{other.name} has a sample every {1e3 * other.sample_time_s:g} ms and "
+                f"{first.name} every {1e3 * first.sample_time_s:g} ms; expected the same: set "
+                f'resample = "{1e3 * first.sample_time_s:g} ms" in [recording]'
+            )
