@@ -44,7 +44,7 @@ class Answer:
     """What a diagnosis said of one case.
 
     place       rank of the hidden effect, from 1; 0 where nothing of the catalogue was hidden
-    tied        the hidden effect leads or stands in the printed tie
+    tied        the hidden effect leads the ranking or stands in the printed tie
     """
 
     case: Case
@@ -63,7 +63,8 @@ class Answer:
         verdict = self.diagnosis.verdict
         if self.case.hidden is None:
             silent = verdict in (Verdict.NOTHING_MISSING, Verdict.SMALL_PROXY)
-            return silent or self.named in ALWAYS_THERE
+            names = verdict in (Verdict.FOUND, Verdict.TIE)
+            return silent or (names and self.named in ALWAYS_THERE)
         if self.case.hidden not in HIDDEN:
             return verdict is Verdict.NOT_IN_CATALOGUE
         return self.tied
@@ -101,7 +102,8 @@ def answer(case: Case, train: Recording, validation: Recording) -> Answer:
     name = public_name(case)
     place = order.index(name) + 1 if name in order else 0
     leader = diagnosis.ranking[0]
-    tied = place == 1 or name in leader.tied_with
+    printed = diagnosis.verdict is Verdict.TIE and name in leader.tied_with
+    tied = place == 1 or printed
     return Answer(case, diagnosis, place, tied)
 
 

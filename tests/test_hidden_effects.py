@@ -23,22 +23,29 @@ def diagnosed(hidden):
     return answer(case, train, held_out)
 
 
-@pytest.mark.parametrize(
-    "hidden",
-    [h if h in ALWAYS else pytest.param(h, marks=pytest.mark.slow) for h in HIDDEN],
-)
-def test_the_hidden_effect_comes_first_or_in_the_printed_tie(hidden):
+@pytest.mark.parametrize("hidden", ALWAYS)
+def test_a_hidden_effect_comes_first_with_its_size(hidden):
     found = diagnosed(hidden)
+    leader = found.diagnosis.ranking[0]
+    (size,) = leader.size.values()
 
-    assert found.tied, confusion([found])
-    assert len(found.diagnosis.ranking[0].tied_with) <= 2
-    if hidden in ALWAYS:
-        leader = found.diagnosis.ranking[0]
-        (size,) = leader.size.values()
-        assert leader.candidate.name == public_name(found.case)
-        assert size.value == pytest.approx(found.case.size, rel=0.25)
-        assert leader.drop_validation > 0.2
-        assert droop(found).decided_by is DecidedBy.NOT_APPLICABLE  # the supply is recorded
+    assert leader.candidate.name == public_name(found.case), confusion([found])
+    assert found.diagnosis.verdict in (Verdict.FOUND, Verdict.TIE)
+    assert size.value == pytest.approx(found.case.size, rel=0.25)
+    assert leader.drop_validation > 0.2
+    assert droop(found).decided_by is DecidedBy.NOT_APPLICABLE  # the supply is recorded
+    asked = sorted(row.candidate.name for row in found.diagnosis.ranking)
+    assert asked == sorted(user_rig(found.case).plant.candidates)
+
+
+@pytest.mark.slow
+def test_of_twelve_hidden_effects_ten_come_first_and_all_at_least_in_a_printed_tie():
+    found = [diagnosed(hidden) for hidden in HIDDEN]
+    first = [each for each in found if each.place == 1]
+
+    assert len(first) >= 10, confusion(found)
+    assert all(each.right for each in found), confusion(found)
+    assert all(len(each.diagnosis.ranking[0].tied_with) <= 2 for each in found)
 
 
 def droop(found):

@@ -105,11 +105,14 @@ class Body(Part):
 
     def rates(self, now: Conditions, received: Received) -> dict[str, Expression]:
         got = received(self.name)
-        mass_kg = self.mass_kg + self.added_mass_kg + total(got, AddedMass)
+        mass_kg = now[self.name].moving_mass_kg + total(got, AddedMass)
         return {
             "position_m": now[self.name].velocity_m_s,
             "velocity_m_s": total(got, Force) / mass_kg,
         }
+
+    def derive(self, now: Conditions) -> dict[str, Expression]:
+        return {"moving_mass_kg": self.mass_kg + self.added_mass_kg}
 
 
 @dataclass(frozen=True, kw_only=True)

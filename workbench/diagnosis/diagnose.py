@@ -83,7 +83,7 @@ def diagnose(
     ranking = _ranking(problem, profiles, refits, moved)
     progress("where it fails")
     where = locate(problem, train)
-    law = _law(problem, ranking, where.balance if where else None, progress)
+    law = _law(problem, ranking, progress)
     verdict = _verdict(ranking, law, held_out)
     best = next((r for r in refits if ranking and r.candidate == ranking[0].candidate), None)
     if best and not best.fit.converged:
@@ -251,9 +251,7 @@ def _scanned_row(problem: Problem, profile: Profile) -> Ranked:
     )
 
 
-def _law(
-    problem: Problem, ranking: tuple[Ranked, ...], balance: str | None, progress: Progress
-) -> Law | None:
+def _law(problem: Problem, ranking: tuple[Ranked, ...], progress: Progress) -> Law | None:
     """An empirical law, unless an effect of the catalogue explains most of the misfit already.
 
     A parameter that leaves its prior is no such effect: it may well imitate the law.
@@ -263,7 +261,7 @@ def _law(
     if leader and certain and leader.drop_train >= CERTAIN_SHARE:
         return None
     progress("empirical law")
-    law = empirical_law(problem, balance)
+    law = empirical_law(problem)
     followed = [r.drop_train for r in ranking if r.fit is not None and predicts_row(r)]
     left = 1.0 - max(followed, default=0.0)
     return law if law and 1.0 - law.drop_train < (1.0 - CLEARLY_LESS) * left else None

@@ -27,12 +27,8 @@ MOST_TERMS = 3
 LEAST_TERM_SHARE = 0.10  # of the misfit that another term must take
 
 
-def empirical_law(problem: Problem, balance: str | None) -> Law | None:
-    """The law of a balance that passes every criterion; None where none does.
-
-    ``balance`` is the balance that the locator names, ``slide.momentum``; with None, or where its
-    terms do not help, those of the others are tried too.
-    """
+def empirical_law(problem: Problem) -> Law | None:
+    """The law of the balance that gains most and passes every criterion; None where none does."""
     problem = _with_terms(problem)
     first = problem
     accepted: list[Candidate] = []

@@ -15,10 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from workbench.comparison.regimes import regimes, shares
+from workbench.air import HEAT_CAPACITY_RATIO
+from workbench.comparison.regimes import regime_shares
 from workbench.diagnosis.result import Dependence, Where
 from workbench.filtering import FilterResult, filter_pass, recording_filter, smooth
-from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.problem import Problem
 from workbench.parts import Body, Chamber
 from workbench.plant import Plant
@@ -44,7 +44,7 @@ class Suspect:
 def locate(problem: Problem, recordings: Sequence[Recording]) -> Where | None:
     """Log-likelihood gain of each balance, and the missing term of the one that gains most.
 
-    None for a plant without states, or where no filter run came through.
+    None for a plant without states, or where no filter run stayed finite.
     """
     plant = problem.whole.lean()
     suspects = _suspects(plant)
@@ -59,14 +59,20 @@ def locate(problem: Problem, recordings: Sequence[Recording]) -> Where | None:
         return recording_filter(plant, recording, unknown, noise, always, decimate)
 
     plain = filter_pass(lacking({}), recording).log_likelihood
+    if not np.isfinite(plain):
+        return None
     gains = {}
     for suspect in suspects:
         runs = {
             q: filter_pass(lacking({suspect.state: q}), recording)
             for q in INTENSITIES[suspect.state.rpartition(".")[2]]
         }
-        best = max(runs, key=lambda q: runs[q].log_likelihood)
-        gains[suspect] = (runs[best].log_likelihood - plain, best)
+        finite = [q for q in runs if np.isfinite(runs[q].log_likelihood)]
+        if finite:
+            best = max(finite, key=lambda q: runs[q].log_likelihood)
+            gains[suspect] = (runs[best].log_likelihood - plain, best)
+    if not gains:
+        return None
     worst = max(gains, key=lambda s: gains[s][0])
     result = smooth(lacking({worst.state: gains[worst][1]}), recording)
     term = result.unknown[0] * worst.factor
@@ -95,28 +101,12 @@ def _suspects(plant: Plant) -> list[Suspect]:
             found.append(Suspect(f"{part.name}.momentum", state, "force_n", mass))
         if isinstance(part, Chamber) and any(isinstance(p, Body) for p in plant.parts):
             volume = float(part.dead_volume_m3) + float(part.area_m2 * part.stroke_m) / 2
-            factor = volume / (1.4 * part.gas_constant_j_kg_k * part.initial_temperature_k)
+            factor = volume / (
+                HEAT_CAPACITY_RATIO * part.gas_constant_j_kg_k * part.initial_temperature_k
+            )
             state = f"{part.name}.pressure_pa"
             found.append(Suspect(f"{part.name}.mass", state, "mass_flow_kg_s", factor))
     return found
-
-
-def regime_shares(fit: Fit) -> dict[str, float]:
-    """Share of the squared error by regime over all training windows, largest first."""
-    windows, squared = fit.windows, (fit.residual**2).sum(axis=0)
-    found: dict[str, list[np.ndarray]] = {}
-    errors, first = [], 0
-    for recording, own in zip(windows.recordings, windows.firsts, strict=True):
-        values = np.full(len(recording), np.nan)
-        for row, start in enumerate(own, start=first):
-            values[start : start + windows.length] = squared[row]
-        first += len(own)
-        errors.append(values)
-        for name, samples in regimes(fit.plant, recording).items():
-            found.setdefault(name, []).append(samples)
-    whole = {name: parts for name, parts in found.items() if len(parts) == len(errors)}
-    chosen = {name: np.concatenate(parts) for name, parts in whole.items()}
-    return shares(chosen, np.concatenate(errors))
 
 
 def _dependences(

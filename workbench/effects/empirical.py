@@ -69,7 +69,7 @@ class EmpiricalForce(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class EmpiricalFlow(Effect):
-    """mdot = w0 + w1 (p / p_s) + w2 v into a chamber, with the temperature of the chamber.
+    """mdot = w0 + w1 (p / p_s) + w2 |v| into a chamber, with the temperature of the chamber.
 
     Source: diagnosis.md 1.9.
     """

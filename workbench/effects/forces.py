@@ -46,17 +46,16 @@ class ConstantForce(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class Weight(Effect):
-    """The weight of a body that moves vertically upwards: F = -M g share.
+    """The weight of a body that moves vertically upwards: F = -M g, with what is added to it.
 
     Source: physics.md 2.7, ``vertical_cylinder``.
     """
 
     body: str
-    mass_kg: Expression = form(1.0, lower=1e-3)
     gravity_m_s2: Expression = form(9.81, lower=0.0)
 
     def terms(self, now: Conditions) -> Iterator[Force]:
-        yield Force(self.body, -self.mass_kg * self.gravity_m_s2)
+        yield Force(self.body, -now[self.body].moving_mass_kg * self.gravity_m_s2)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -41,7 +41,7 @@ def vertical_cylinder() -> Plant:
             PressureFace(name="chamber", body="rod", area_m2=pi / 4 * PISTON_M**2),
         ),
         effects=(
-            Weight(name="weight", body="rod", mass_kg=MASS_KG),
+            Weight(name="weight", body="rod"),
             EndStops(name="stops", body="rod", stiffness_n_m=2e6, upper_m=UPPER_STOP_M),
             StribeckFriction(
                 name="friction", body="rod", chambers=("chamber",), steepness_s_m=STEEPNESS_S_M
