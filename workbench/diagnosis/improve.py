@@ -84,11 +84,11 @@ def add(
     ValueError
         If the effect is there already, or only a shift of a parameter that is fitted anyway.
     """
+    plant = rig.fit_for(train[0])
+    require([name], plant.candidates, plant.name)
     if not validation:
         warnings.warn(WEAK_EVIDENCE, stacklevel=2)
         train, validation = split(train)
-    plant = rig.fit_for(train[0])
-    require([name], plant.candidates, plant.name)
     candidate = plant.candidates[name]
     progress("prior fit")
     problem = pose(rig, train, validation)
