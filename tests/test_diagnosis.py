@@ -11,7 +11,7 @@ from workbench.diagnosis.scan import scan
 from workbench.fitting.fit import fit
 from workbench.fitting.problem import pose
 from workbench.recording import Recording
-from workbench.rig import default_rig, load_rig
+from workbench.rig import load_rig
 from workbench.rig_writing import rig_text
 
 AREA_M2 = 5.187e-4
@@ -233,7 +233,3 @@ def test_a_fit_reports_priors_bounds_and_correlations(rig):
     assert row.value == pytest.approx(8.0, rel=0.05)
     assert row.deviation < row.prior_deviation
     assert np.allclose(np.diag(report.correlations), 1.0)
-
-
-def test_default_rigs_are_ready_for_diagnosis():
-    assert default_rig("cylinder_bench").added == ()
