@@ -71,6 +71,13 @@ def test_every_effect_of_the_plant_stands_in_the_ranking_once(rig, found):
     assert sorted(names) == sorted(rig.plant.candidates)
 
 
+def test_stiction_is_not_asked_for_without_coulomb_friction(found):
+    row = next(row for row in found.ranking if row.candidate.name == "stiction")
+
+    assert row.decided_by is DecidedBy.NOT_APPLICABLE
+    assert row.reasons == ("nothing without friction.coulomb_force_n",)
+
+
 def test_what_was_not_followed_says_so(found):
     for row in found.ranking:
         assert (row.decided_by is DecidedBy.REFIT) == (row.fit is not None)
@@ -138,12 +145,12 @@ def test_a_standard_deviation_says_how_far_sizes_scatter(rig):
 
 def test_the_shape_that_the_scan_found_is_kept_by_the_refit(rig):
     def stribeck(v):
-        return coulomb(v) + 6.0 * np.sign(v) * np.exp(-((v / 0.01) ** 2))
+        return coulomb(v) + 6.0 * np.sign(v) * np.exp(-((v / 0.008) ** 2))
 
     train, held_out = [bench(1, stribeck), bench(3, stribeck)], [bench(2, stribeck)]
     step = add(add(rig, "coulomb_friction", train, held_out).rig, "stiction", train, held_out)
 
-    assert step.rig.plant.values["friction.stribeck_velocity_m_s"] == 0.01
+    assert step.rig.plant.values["friction.stribeck_velocity_m_s"] == 0.008
     assert step.rig.plant.values["friction.stiction_excess_n"] == pytest.approx(6.0, rel=0.15)
 
 
