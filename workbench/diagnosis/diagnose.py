@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from workbench.diagnosis.judge import (
     CLEARLY_LESS,
     HELD_OUT_REASON,
+    LEAST_TRAINING,
     SHARE_REASON,
     predicts,
     reasons_against,
@@ -117,9 +118,12 @@ def _followed(problem: Problem, progress: Progress) -> _Followed:
     """Scan the catalogue and refit the best few."""
     progress("scan of the catalogue")
     profiles = _scanned(problem)
-    refits = []
+    refits: list[Refit] = []
     for rank, profile in enumerate(profiles[:REFITTED]):
-        if rank < ALWAYS_REFITTED or profile.drop > WORTH_A_REFIT * profiles[0].drop:
+        accepted = any(not reasons_against(problem.base, each) for each in refits)
+        promising = profile.drop > WORTH_A_REFIT * profiles[0].drop
+        hopeful = not accepted and profile.drop > LEAST_TRAINING * problem.misfit
+        if rank < ALWAYS_REFITTED or promising or hopeful:
             progress(f"refit with {profile.candidate.name}")
             refits.append(refit(problem, profile))
     moved = shifts(problem)
