@@ -23,6 +23,7 @@ from studies.command_line.application import (
 
 DesignFile = Annotated[Path, typer.Argument(metavar="DESIGN", help="What `design` wrote.")]
 Several = Annotated[int, typer.Option("--runs", metavar="N", min=1, help="Plants to draw.")]
+MISSED = "missed: 0.2 mm at the end of a step, no limit cycle above 0.1 mm, no reference lost"
 CHECK = "workbench check rig.toml lq.toml --estimator mhe --scenario step --figures figures"
 
 
@@ -107,7 +108,7 @@ def check(
     """
     with answering(quiet) as say:
         from studies.checking import check_rig
-        from studies.closed_loop_check import table
+        from studies.closed_loop_metrics import table
         from studies.documents import check_document
         from workbench.rig import load_rig
 
@@ -122,6 +123,6 @@ def check(
             save_all(styled_figures(found), figures, command_text())
             say(f"figures in {figures}")
         typer.echo(table(found.rows))
-        if not all(row.reached for row in found.rows):
-            typer.echo("the goal is missed: 0.2 mm at the end of a step, no limit cycle", err=True)
+        if any(row.reached is False for row in found.rows):
+            typer.echo(MISSED, err=True)
             raise typer.Exit(NO)
