@@ -11,15 +11,18 @@ import scipy.sparse as sp
 from scipy.linalg import solve_discrete_are
 
 from controllers.positioning import STATES, PositioningSpec
+from controllers.spec import ranged
 from linearize.discrete import sampled
 from linearize.modes import Mode
-from linearize.standard import PRESSURES, VELOCITY
+from linearize.standard import PRESSURES, SUPPLY, VELOCITY, stroke_m
+from workbench.plant import Plant
 
 if TYPE_CHECKING:
     import osqp
 
 LIMITED = (0, 2, 3)  # position and pressures, of STATES
 SLACK_UNIT = np.array([1e-3, 1e4, 1e4])  # m, Pa, Pa: violations that cost alike
+LONGEST = 500  # samples ahead; the program is dense, and grows with the square
 SETTINGS = {
     "eps_abs": 1e-5,
     "eps_rel": 1e-5,
@@ -42,23 +45,23 @@ class MpcSpec:
         Force by which the target pressures shift per integral of the position error.
     margin_m
         The position stays this far from the end stops.
-    lowest_pa, highest_pa
-        Soft limits of the pressures.
+    lowest_pa, below_supply_pa
+        Soft limits of the pressures, the upper one as its distance from the supply pressure.
     slack_weight
         Cost of violating a limit by 1 mm or 0.1 bar at one sample.
     """
 
     sample_time_s: float = 2e-3
-    horizon: int = 20
+    horizon: int = ranged(20, least=1, most=LONGEST)
     position_m: float = 1e-3
     velocity_m_s: float = 0.1
     pressure_pa: float = 1e6
     opening_v: float = 0.3
     move_v: float = 3.0
-    force_n_m_s: float = 5e4
-    margin_m: float = 2e-3
+    force_n_m_s: float = ranged(5e4)
+    margin_m: float = ranged(2e-3)
     lowest_pa: float = 1.2e5
-    highest_pa: float = 6.9e5
+    below_supply_pa: float = ranged(1e4)
     slack_weight: float = 1e3
     positioning: PositioningSpec = field(default_factory=PositioningSpec)
 
@@ -139,10 +142,10 @@ def program_of(
     spec: MpcSpec,
     centre_v: float,
     area_m2: float,
-    stroke_m: float,
+    limits: np.ndarray,
     openings: tuple[float, float],
 ) -> Program:
-    """The condensed program of a mode."""
+    """The condensed program of a mode; ``limits`` as :func:`limits_of` gives them."""
     small, n, N = sampled(mode, spec.sample_time_s), len(STATES), spec.horizon
     tolerable = np.array([spec.position_m, spec.velocity_m_s, spec.pressure_pa, spec.pressure_pa])
     Q, R, S = np.diag(tolerable**-2.0), spec.opening_v**-2.0, spec.move_v**-2.0
@@ -172,11 +175,26 @@ def program_of(
             [np.zeros((len(LIMITED), N)), np.eye(len(LIMITED))],
         ]
     )
-    low = np.tile([spec.margin_m, spec.lowest_pa, spec.lowest_pa] / SLACK_UNIT, N)
-    top_m = stroke_m - spec.margin_m
-    high = np.tile([top_m, spec.highest_pa, spec.highest_pa] / SLACK_UNIT, N)
-    limits = np.array([low, high])
-    return Program(H, rows, free, forced, drift, pushed, stages, R, S, limits, openings)
+    ahead = np.tile(limits / SLACK_UNIT, N)
+    return Program(H, rows, free, forced, drift, pushed, stages, R, S, ahead, openings)
+
+
+def limits_of(plant: Plant, spec: MpcSpec) -> np.ndarray:
+    """Lowest and highest position and pressures, shape (2, 3).
+
+    Raises
+    ------
+    ValueError
+        If nothing is left between them.
+    """
+    highest_pa = float(plant.values[SUPPLY]) - spec.below_supply_pa
+    low = [spec.margin_m, spec.lowest_pa, spec.lowest_pa]
+    high = [stroke_m(plant) - spec.margin_m, highest_pa, highest_pa]
+    if not np.less(low, high).all():
+        what = f"margin_m {spec.margin_m:g}, lowest_pa {spec.lowest_pa:g} and below_supply_pa "
+        what += f"{spec.below_supply_pa:g} leave no room on {plant.name}"
+        raise ValueError(f"mpc: {what}; expected less than half the stroke and the supply pressure")
+    return np.array([low, high])
 
 
 def pushed_mode(mode: Mode, area_m2: float) -> Mode:

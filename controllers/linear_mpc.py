@@ -19,13 +19,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controllers.condensed import MpcSpec, Program, program_of
+from controllers.condensed import MpcSpec, Program, limits_of, program_of
 from controllers.positioning import STATES, Memory, Positioning, Task, positioning
 from controllers.scheduled import Schedule, scheduled
 from linearize.modes import HybridModel
 from linearize.reduction import closed_command
 from workbench.contracts import Command, Estimate
-from workbench.effects.forces import EndStops
 
 SOLVED = (1, 2)  # OSQP's status: solved, solved inaccurately
 
@@ -125,8 +124,8 @@ def linear_mpc(hybrid: HybridModel, spec: MpcSpec | None = None) -> LinearMpc:
     """One program on every mode in which the valve drives the motion."""
     spec = spec or MpcSpec()
     task = positioning(hybrid, spec.positioning)
-    stroke = next(e.upper_m for e in hybrid.plant.effects if isinstance(e, EndStops))
     centre_v = closed_command(hybrid.plant)
-    sizes = centre_v, task.area_m2, stroke, task.valve.openings_v
+    limits = limits_of(hybrid.plant, spec)
+    sizes = centre_v, task.area_m2, limits, task.valve.openings_v
     programs = scheduled(hybrid, lambda mode: program_of(mode, spec, *sizes))
     return LinearMpc(task, programs, spec.sample_time_s, spec.force_n_m_s, spec.horizon + 1)

@@ -8,6 +8,7 @@ import numpy as np
 
 from controllers.positioning import STATES, Memory, Positioning, PositioningSpec, positioning
 from controllers.scheduled import Schedule, scheduled
+from controllers.spec import ranged
 from linearize.modes import HybridModel, Mode
 from linearize.standard import POSITION, VELOCITY
 from workbench.contracts import Command, Estimate
@@ -40,10 +41,10 @@ class PidSpec:
     """
 
     sample_time_s: float = 2e-3
-    stiffening: float = 8.0
-    share_of_limit: float = 0.4
+    stiffening: float = ranged(8.0, least=1.0, above=True)
+    share_of_limit: float = ranged(0.4, most=1.0, above=True)
     integral_time_s: float = 1.0
-    filter_s: float = 2e-3
+    filter_s: float = ranged(2e-3)
     positioning: PositioningSpec = field(default_factory=lambda: CALM)
 
 

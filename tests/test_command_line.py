@@ -7,9 +7,9 @@ import time
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from commands import call
 
-from studies.command_line import ORDER, app
+from studies.command_line import ORDER
 from studies.command_line.application import answering, spread
 from workbench.effects import CATALOGUE
 from workbench.plants import PLANTS
@@ -17,11 +17,6 @@ from workbench.reading import read_recording
 from workbench.rig import default_rig, load_rig
 
 RIG = 'name = "drive 7"\nplant = "servo_drive"\n'
-
-
-def call(*words):
-    """What a command answers."""
-    return CliRunner().invoke(app, [str(word) for word in words])
 
 
 @pytest.fixture(scope="module")
@@ -248,7 +243,13 @@ def test_options_take_several_values_in_a_row_behind_the_arguments():
 
 @pytest.mark.parametrize(
     ("error", "code"),
-    [(ArithmeticError("diverged"), 3), (ValueError("no"), 2), (KeyboardInterrupt(), 130)],
+    [
+        (ArithmeticError("diverged"), 3),
+        (ValueError("no"), 2),
+        (KeyboardInterrupt(), 130),
+        (StopIteration(), 3),
+        (TypeError("argument of type 'int'\nis not iterable"), 3),
+    ],
 )
 def test_what_goes_wrong_becomes_an_exit_code(error, code):
     import typer
@@ -257,3 +258,18 @@ def test_what_goes_wrong_becomes_an_exit_code(error, code):
         raise error
 
     assert stopped.value.exit_code == code
+
+
+def test_what_nobody_foresaw_is_one_line_and_its_trace_is_shown_when_asked(monkeypatch, capsys):
+    import typer
+
+    with pytest.raises(typer.Exit), answering():
+        raise TypeError("argument of type 'int'\nis not iterable")
+    assert capsys.readouterr().err.splitlines() == [
+        "workbench: inside the program: TypeError argument of type 'int'; "
+        "WORKBENCH_DEBUG=1 shows where"
+    ]
+
+    monkeypatch.setenv("WORKBENCH_DEBUG", "1")
+    with pytest.raises(TypeError), answering():
+        raise TypeError("argument")

@@ -13,6 +13,7 @@ from linearize.discrete import sampled
 from linearize.standard import standard_modes
 from workbench.contracts import Estimate
 from workbench.effects import DeadZone, ValveOffset
+from workbench.errors import InputError
 from workbench.plants.servo_drive import COMMAND, servo_drive
 
 everyone = pytest.mark.parametrize("name", CONTROLLERS)
@@ -107,9 +108,9 @@ def test_a_design_file_builds_the_same_controller_again(tmp_path, name):
 
 
 def test_a_wrong_number_in_a_design_is_an_error_that_names_it():
-    with pytest.raises(KeyError, match=r"lq has no positon_m; did you mean position_m\?"):
+    with pytest.raises(InputError, match=r"lq has no positon_m; .*did you mean 'position_m'\?"):
         design("lq", servo_drive(), {"positon_m": 1e-3})
-    with pytest.raises(ValueError, match=r"lq\.position_m is 'far', expected a number"):
+    with pytest.raises(InputError, match=r"lq\.position_m is 'far'; expected a number above 0"):
         design("lq", servo_drive(), {"position_m": "far"})
     with pytest.raises(KeyError, match="no controller lqg; there is pid, lq, mpc"):
         design("lqg", servo_drive())

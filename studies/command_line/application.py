@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 import sys
 import time
@@ -15,6 +16,7 @@ import typer
 from typer.core import TyperCommand
 
 DONE, NO, WRONG_INPUT, SOLVER_FAILED, STOPPED = 0, 1, 2, 3, 130
+DEBUG = "WORKBENCH_DEBUG"  # set to anything, what is unforeseen is shown in full
 
 app = typer.Typer(
     name="workbench",
@@ -93,8 +95,20 @@ def answering(quiet: bool = False) -> Iterator[Callable[[str], None]]:
         _stop(f"{error.filename or ''}: {error.strerror or error}".lstrip(": "), WRONG_INPUT)
     except KeyboardInterrupt:
         _stop("stopped; no file is half-written", STOPPED)
+    except (typer.Exit, typer.Abort):
+        raise
+    except Exception as error:
+        if os.environ.get(DEBUG):
+            raise
+        _stop(_unforeseen(error), SOLVER_FAILED)
     finally:
         warnings.showwarning = before
+
+
+def _unforeseen(error: Exception) -> str:
+    """One line for what nobody foresaw, with the way to its details."""
+    said = f"{type(error).__name__} {error}".strip().split("\n")[0]
+    return f"inside the program: {said}; {DEBUG}=1 shows where"
 
 
 def example(command: str) -> str:
