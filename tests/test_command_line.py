@@ -11,7 +11,7 @@ from commands import call
 
 from studies.command_line import ORDER
 from studies.command_line.application import answering, spread
-from workbench.effects import CATALOGUE
+from workbench.causes import all_causes
 from workbench.plants import PLANTS
 from workbench.reading import read_recording
 from workbench.rig import default_rig, load_rig
@@ -65,7 +65,24 @@ def test_plants_are_listed_one_line_each():
 def test_effects_lists_every_cause_of_the_catalogue():
     words = {line.split()[0] for line in call("effects").stdout.splitlines()[1:]}
 
-    assert words == {cause.name for effect in CATALOGUE for cause in effect.causes}
+    placed = {c.cause.name for build in PLANTS.values() for c in build().candidates.values()}
+    assert placed | {"added_mass", "dead_volume"} <= words
+    assert words == {*all_causes()}
+
+
+@pytest.mark.parametrize("command", [["plants"], ["effects"], ["studies"]])
+def test_lists_take_quiet_like_every_command(command):
+    assert call(*command, "-q").exit_code == 0
+
+
+def test_an_effect_that_sits_on_a_part_is_known_where_it_has_no_place(tmp_path):
+    rig = tmp_path / "rig.toml"
+    rig.write_text('plant = "cylinder_bench"\n[effects]\nadd = ["added_mass", "added_mas"]\n')
+
+    said = call("compare", rig, "run.csv").stderr.splitlines()
+
+    assert "added_mass: cylinder_bench has no place for this effect" in said[0]
+    assert "added_mas: there is no such effect" in said[1]
 
 
 @pytest.mark.parametrize("plant", PLANTS)
@@ -239,6 +256,9 @@ def test_options_take_several_values_in_a_row_behind_the_arguments():
         "rig", "a", "--validate", "b", "--validate", "c", "-o", "d",
     ]  # fmt: skip
     assert spread(["--validate", "b", "rig", "a"], several) == ["--validate", "b", "rig", "a"]
+    assert spread(["rig", "a", "--validate=b", "c", "-o", "d"], several) == [
+        "rig", "a", "--validate=b", "--validate", "c", "-o", "d",
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize(

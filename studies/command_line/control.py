@@ -17,9 +17,8 @@ from studies.command_line.application import (
     app,
     command_text,
     example,
-    writable,
-    write_json,
 )
+from studies.command_line.files import writable, write_json
 
 DesignFile = Annotated[Path, typer.Argument(metavar="DESIGN", help="What `design` wrote.")]
 Several = Annotated[int, typer.Option("--runs", metavar="N", min=1, help="Plants to draw.")]
@@ -43,7 +42,7 @@ def modes(
         from studies.documents import modes_document
         from workbench.rig import load_rig
 
-        writable(json)
+        writable(json, folders=[export])
         known = load_rig(rig)
         say("linearising")
         hybrid = standard_modes(known.plant)
@@ -112,7 +111,7 @@ def check(
         from studies.documents import check_document
         from workbench.rig import load_rig
 
-        writable(json)
+        writable(json, folders=[figures])
         known = load_rig(rig)
         found = check_rig(known, [design], estimator or ["ekf"], scenario or (), runs, say)
         write_json(json, check_document(known.name, found))
