@@ -27,6 +27,7 @@ from workbench.diagnosis.result import (
     Where,
 )
 from workbench.effect import Kind
+from workbench.effects.empirical import EmpiricalForce
 from workbench.errors import InputError
 from workbench.fitting.errors import SignalError
 from workbench.plants import PLANTS
@@ -133,12 +134,23 @@ def test_nothing_missing_names_no_effect():
 
 
 def test_an_empirical_law_comes_with_its_range():
-    law = Law("slide.momentum", {"v|v|": -240.0}, {"velocity": (-0.5, 0.5)}, 0.8, 0.7, "-240 v|v|")
+    force = EmpiricalForce(name="law@slide", body="slide")
+    terms = {f"law@slide.{cause.strength}": -240.0 for cause in force.causes}
+    ranges = {"slide.velocity_m_s": (-0.5, 0.5), "chamber_a.pressure_pa": (3e5, 6e5)}
+    law = Law("slide.momentum", terms, ranges, 0.8, 0.7, "-240 v|v|")
 
     document = diagnosis_document(diagnosis(Verdict.NOT_IN_CATALOGUE, law=law), UNITS)
 
-    assert document["law"]["terms"] == {"v|v|": -240.0}
-    assert document["law"]["ranges"] == {"velocity": [-0.5, 0.5]}
+    assert document["law"]["terms"] == {
+        "law@slide.quadratic": {"value": -240.0, "unit": "N s^2/m^2"},
+        "law@slide.cubic": {"value": -240.0, "unit": "N s^3/m^3"},
+        "law@slide.placed_viscous": {"value": -240.0, "unit": "N s/m^2"},
+        "law@slide.curved": {"value": -240.0, "unit": "N/m^2"},
+    }
+    assert document["law"]["ranges"] == {
+        "slide.velocity": {"low": -0.5, "high": 0.5, "unit": "m/s"},
+        "chamber_a.pressure": {"low": 3e5, "high": 6e5, "unit": "Pa"},
+    }
 
 
 def test_a_diagnosis_reads_in_the_units_of_people():
