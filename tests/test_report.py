@@ -1,4 +1,4 @@
-"""Results as text, JSON, figures and one page that needs no network."""
+"""Results as text, JSON and figures."""
 
 import json
 import math
@@ -13,7 +13,6 @@ from studies.figures.diagnosis import diagnosis_figures
 from studies.figures.improvement import before_after_figure, budget_figure
 from studies.figures.modes import pole_figure
 from studies.figures.style import new_figure, save, styled
-from studies.report import Section, render_folder, write_report
 from studies.text import columns, shown
 from studies.text_of_results import correlation_lines, diagnosis_text, unit_names
 from workbench.diagnosis.result import (
@@ -28,7 +27,6 @@ from workbench.diagnosis.result import (
 )
 from workbench.effect import Kind
 from workbench.effects.empirical import EmpiricalForce
-from workbench.errors import InputError
 from workbench.fitting.errors import SignalError
 from workbench.plants import PLANTS
 
@@ -236,56 +234,3 @@ def test_two_runs_give_the_same_bytes(tmp_path):
         return [(tmp_path / f"{stem}.{e}").read_bytes() for e in ("pdf", "svg", "csv")]
 
     assert drawn("one") == drawn("two")
-
-
-@pytest.fixture
-def page(figures, tmp_path):
-    for name in ("poles", "budget"):
-        save(figures[name], tmp_path / "figures" / name, "workbench demo")
-    sections = [
-        Section("Modes <&>", ("Some text.",), "a  b\n1  2", ("poles",)),
-        Section("Error", figures=("budget",)),
-    ]
-    return write_report(tmp_path, "From a recording", "workbench demo", sections)
-
-
-def test_a_page_holds_its_figures_and_needs_no_network(page):
-    text = page.read_text()
-
-    assert text.count("<svg") == 2
-    assert "Modes &lt;&amp;&gt;" in text and "1  2" in text
-    assert not re.search(r'(src|href)="(?!#)', text)
-    assert not re.search(r"@import|url\((?!#)|<metadata", text)
-
-
-def test_names_inside_a_page_are_its_own(page):
-    names = re.findall(r'\bid="([^"]+)"', page.read_text())
-    used = re.findall(r'href="#([^"]+)"|url\(#([^)]+)\)', page.read_text())
-
-    assert len(names) == len(set(names))
-    assert {a or b for a, b in used} <= set(names)
-
-
-def test_a_page_can_be_made_again_from_its_folder(page):
-    before = page.read_bytes()
-    page.unlink()
-
-    assert render_folder(page.parent).read_bytes() == before
-
-
-def test_a_folder_of_figures_alone_makes_a_page_too(figures, tmp_path):
-    save(figures["budget"], tmp_path / "budget", "workbench improve")
-
-    assert "<h2>1. budget</h2>" in render_folder(tmp_path).read_text()
-
-
-def test_an_empty_folder_is_refused(tmp_path):
-    with pytest.raises(InputError, match="nothing to report"):
-        render_folder(tmp_path)
-
-
-def test_a_report_of_others_is_refused(tmp_path):
-    (tmp_path / "report.json").write_text('{"a": 1}')
-
-    with pytest.raises(InputError, match="no report of ours"):
-        render_folder(tmp_path)
