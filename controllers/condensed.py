@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -24,6 +24,7 @@ LIMITED = (0, 2, 3)  # position and pressures, of STATES
 SLACK_UNIT = np.array([1e-3, 1e4, 1e4])  # m, Pa, Pa: violations that cost alike
 LONGEST = 500  # samples ahead; the program is dense, and grows with the square
 SETTINGS = {
+    "rho": 0.1,
     "eps_abs": 1e-5,
     "eps_rel": 1e-5,
     "polishing": True,
@@ -128,13 +129,36 @@ class Program:
         return np.linalg.inv(self.H)
 
     def solver(self, g: np.ndarray, low: np.ndarray, high: np.ndarray) -> osqp.OSQP:
-        """A fresh OSQP: one that is kept adapts its step length, and would answer by its past."""
+        """OSQP with this gradient and these sides, still to be started.
+
+        It adapts its step length while it solves, so that is set back: the same program from the
+        same start has the same solution to the last bit, whatever was solved before.
+        """
+        self._kept.update(q=g, l=low, u=high)
+        self._kept.update_settings(rho=SETTINGS["rho"])
+        return self._kept
+
+    @cached_property
+    def _kept(self) -> osqp.OSQP:
+        """One solver for all samples, for one thread; to set it up takes longer than to solve.
+
+        It is set up without gradient and sides: its scaling is found there, once and for all.
+        """
         import osqp
 
-        solver = osqp.OSQP()
+        solver, none = osqp.OSQP(), np.full(len(self.rows), np.inf)
         H, rows = sp.csc_matrix(np.triu(self.H)), sp.csc_matrix(self.rows)
-        solver.setup(H, g, rows, low, high, **SETTINGS)
+        solver.setup(H, np.zeros(len(self.H)), rows, -none, none, **SETTINGS)
         return solver
+
+    def prepared(self) -> Program:
+        """The same program with its solver set up, so that the first sample need not wait."""
+        _ = self._kept, self.inverse
+        return self
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but the solver, which another process sets up again."""
+        return {key: value for key, value in self.__dict__.items() if key != "_kept"}
 
 
 def program_of(

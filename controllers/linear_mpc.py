@@ -127,5 +127,5 @@ def linear_mpc(hybrid: HybridModel, spec: MpcSpec | None = None) -> LinearMpc:
     centre_v = closed_command(hybrid.plant)
     limits = limits_of(hybrid.plant, spec)
     sizes = centre_v, task.area_m2, limits, task.valve.openings_v
-    programs = scheduled(hybrid, lambda mode: program_of(mode, spec, *sizes))
+    programs = scheduled(hybrid, lambda mode: program_of(mode, spec, *sizes).prepared())
     return LinearMpc(task, programs, spec.sample_time_s, spec.force_n_m_s, spec.horizon + 1)
