@@ -10,6 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import solve_discrete_are
 
+from controllers.margins import Law
 from controllers.positioning import STATES, PositioningSpec
 from controllers.spec import ranged
 from linearize.discrete import sampled
@@ -127,6 +128,20 @@ class Program:
     def inverse(self) -> np.ndarray:
         """Inverse of H, for the optimum without limits."""
         return np.linalg.inv(self.H)
+
+    def law(self, force_n_m_s: float, area_m2: float, sample_time_s: float) -> Law:
+        """The first opening without limits; its memory is the integral and the last opening.
+
+        The integral grows into a force: it pushes the prediction and shifts the target pressures.
+        """
+        n = len(STATES)
+        pull = -2.0 * self.inverse[0, : self.horizon] @ self.forced.T @ self.Q
+        shift = np.tile([0.0, 0.0, -0.5, 0.5], self.horizon) / area_m2
+        integral = force_n_m_s * pull @ (self.pushed - shift)
+        error = np.array([sample_time_s, *np.zeros(n - 1)])
+        C = np.array([integral, 2.0 * self.S * self.inverse[0, 0]])
+        D = pull @ self.free + integral * error
+        return Law(np.array([[1.0, 0.0], C]), np.array([error, D]), C, D)
 
     def solver(self, g: np.ndarray, low: np.ndarray, high: np.ndarray) -> osqp.OSQP:
         """OSQP with this gradient and these sides, still to be started.

@@ -17,6 +17,7 @@ import numpy as np
 
 from controllers import CONTROLLERS
 from controllers.spec import replaced
+from linearize.modes import HybridModel
 from linearize.standard import standard_modes
 from workbench.contracts import Controller
 from workbench.errors import whole_file
@@ -31,11 +32,13 @@ class Design:
     method       key of :data:`controllers.CONTROLLERS`
     plant        the plant its modes were taken from
     spec         the specification, a dataclass of numbers
+    hybrid       those modes
     """
 
     method: str
     plant: Plant
     spec: Any
+    hybrid: HybridModel
     controller: Controller
 
 
@@ -53,7 +56,8 @@ def design(method: str, plant: Plant, numbers: Mapping[str, Any] | None = None) 
         raise KeyError(f"no controller {method}; there is {', '.join(CONTROLLERS)}")
     found = CONTROLLERS[method]
     spec = replaced(found.spec(), numbers or {}, method)
-    return Design(method, plant, spec, found.design(standard_modes(plant), spec))
+    hybrid = standard_modes(plant)
+    return Design(method, plant, spec, hybrid, found.design(hybrid, spec))
 
 
 def write_design(found: Design, path: Path) -> None:

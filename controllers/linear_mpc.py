@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from controllers.condensed import MpcSpec, Program, limits_of, program_of
+from controllers.margins import Law
 from controllers.positioning import STATES, Memory, Positioning, Task, positioning
 from controllers.scheduled import Schedule, scheduled
 from linearize.modes import HybridModel
@@ -47,6 +48,12 @@ class LinearMpc:
     sample_time_s: float
     force_n_m_s: float
     preview: int
+
+    @property
+    def laws(self) -> Schedule[Law]:
+        """What it does while the slide moves and no limit is met: the first move of each plan."""
+        numbers = self.force_n_m_s, self.task.area_m2, self.sample_time_s
+        return self.programs.mapped(lambda program: program.law(*numbers))
 
     def start(self) -> Command:
         return Command(self.task.valve.shut, Memory())

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from controllers.margins import Law
 from controllers.positioning import STATES, Memory, Positioning, PositioningSpec, positioning
 from controllers.scheduled import Schedule, scheduled
 from controllers.spec import ranged
@@ -57,6 +58,16 @@ class PidGain:
     derivative: float
     poles: np.ndarray
 
+    def law(self, sample_time_s: float, filter_s: float) -> Law:
+        """Its memory is the integral of the error and the filtered velocity."""
+        share = sample_time_s / (sample_time_s + filter_s)
+        moved = np.zeros((2, len(STATES)))
+        moved[0, STATES.index(POSITION)], moved[1, STATES.index(VELOCITY)] = sample_time_s, share
+        kept, gains = np.diag([1.0, 1.0 - share]), np.array([self.integral, self.derivative])
+        direct = -gains @ moved
+        direct[STATES.index(POSITION)] -= self.proportional
+        return Law(kept, moved, -gains @ kept, direct)
+
 
 @dataclass(frozen=True)
 class Pid:
@@ -71,6 +82,11 @@ class Pid:
     sample_time_s: float
     filter_s: float
     preview: int = 2
+
+    @property
+    def laws(self) -> Schedule[Law]:
+        """What it does while the slide moves and no limit is met."""
+        return self.gains.mapped(lambda gain: gain.law(self.sample_time_s, self.filter_s))
 
     def start(self) -> Command:
         return Command(self.task.valve.shut, Memory(plan=0.0))

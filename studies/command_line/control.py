@@ -71,7 +71,9 @@ def design(
     with answering(quiet) as say:
         from controllers.design_file import design as design_controller
         from controllers.design_file import gains, write_design
+        from controllers.margins import margins
         from studies.catalogue_text import read_toml
+        from studies.design_text import margins_text
         from workbench.rig import load_rig
 
         writable(output)
@@ -82,6 +84,8 @@ def design(
         write_design(found, output)
         for name, gain in gains(found.controller):
             typer.echo(f"{name}: {gain}")
+        made = found.controller
+        typer.echo(margins_text(margins(found.hybrid, made.laws, made.sample_time_s)))
         typer.echo(f"wrote {output}")
 
 
