@@ -15,7 +15,7 @@ from workbench.diagnosis.result import Size
 from workbench.diagnosis.scan import Profile, Trial
 from workbench.diagnosis.shifts import Shift
 from workbench.fitting.error_model import OUTLYING
-from workbench.fitting.errors import per_sample
+from workbench.fitting.errors import plain_ratio
 from workbench.fitting.gauss_newton import Fit, best_start, fit_windows
 from workbench.fitting.linearised import Linearised, Point, borrowed
 from workbench.fitting.posterior import posterior_deviation
@@ -39,7 +39,8 @@ class Refit:
     size                strength and forms with standard deviations, by full parameter name
     drop_train          share of the misfit beyond noise that goes away, and
     drop_validation     the same on held-out recordings, where no window counts too much
-    plain_validation    held-out squared error over that of the base, nothing capped
+    plain_validation    held-out squared error over that of the base, nothing capped, as the
+                        geometric mean over outputs
     """
 
     candidate: Candidate
@@ -112,7 +113,7 @@ def _refit(problem: Problem, candidate: Candidate, fit: Fit, names: tuple[str, .
         size=sizes(fit, names),
         drop_train=_drop(problem.base, fit),
         drop_validation=held_out_drop(before, validation),
-        plain_validation=per_sample(validation) / per_sample(before),
+        plain_validation=plain_ratio(before, validation),
     )
 
 

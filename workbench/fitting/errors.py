@@ -50,6 +50,15 @@ def per_sample(fit: Fit | None) -> float:
     return float((error**2).sum() / windows.count)
 
 
+def plain_ratio(before: Fit | None, after: Fit | None) -> float:
+    """Squared error after over before, nothing capped: geometric mean over outputs, NaN without."""
+    if before is None or after is None:
+        return float("nan")
+    old, new = signal_errors(before), signal_errors(after)
+    ratios = [new[name].rmse / max(old[name].rmse, 1e-300) for name in old]
+    return float(np.exp(2.0 * np.mean(np.log(np.maximum(ratios, 1e-12)))))
+
+
 def errors_of(train: Fit, validation: Fit | None) -> Errors:
     """Errors in units of a fit and of its validation."""
     found = {"train": signal_errors(train)}
