@@ -98,6 +98,7 @@ def test_stiction_holds_a_load_below_break_away_and_not_above():
     assert np.ptp(moving["position_m"]) > 1e-3
 
 
+@pytest.mark.slow
 def test_open_loop_sine_gives_the_numbers_of_physics_7():
     out = run(NOMINAL, sine(4000), substeps=25)
     position, velocity = out["position_m"], out["velocity_m_s"]
@@ -148,6 +149,7 @@ def test_stops_hold_the_piston():
     assert abs(out["position_m"][-1] - d.STROKE_M) < 3e-4
 
 
+@pytest.mark.slow
 def test_the_error_is_first_order_in_the_step():
     fine, coarse, coarser = (
         run(NOMINAL, sine(400), substeps=n)["position_m"] for n in (100, 50, 25)

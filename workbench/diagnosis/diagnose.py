@@ -13,24 +13,22 @@ from dataclasses import dataclass
 
 from workbench.diagnosis.judge import (
     CLEARLY_LESS,
-    HELD_OUT_REASON,
     LEAST_TRAINING,
     SHARE_REASON,
     predicts,
     reasons_against,
-    tie_group,
 )
 from workbench.diagnosis.law import empirical_law
+from workbench.diagnosis.ranking import predicts_row, ranked
 from workbench.diagnosis.refit import Refit, refit, refit_shift
-from workbench.diagnosis.result import DecidedBy, Diagnosis, Law, Ranked, Verdict
+from workbench.diagnosis.result import Diagnosis, Law, Ranked, Verdict
 from workbench.diagnosis.scan import Profile, scan
-from workbench.diagnosis.shifts import LEAVES_PRIOR, Shift, shifts
+from workbench.diagnosis.shifts import Shift, shifts
 from workbench.diagnosis.where import locate
 from workbench.effect import Kind
 from workbench.fitting.errors import errors_of
 from workbench.fitting.problem import Problem, improved_base, pose, split
 from workbench.fitting.windows import MOST_WINDOWS
-from workbench.plant import Candidate
 from workbench.recording import Recording
 from workbench.rig import Rig
 
@@ -82,7 +80,7 @@ def diagnose(
         problem = better
         found = _followed(problem, progress)
     profiles, refits, moved = found.profiles, found.refits, found.moved
-    ranking = _ranking(problem, profiles, refits, moved)
+    ranking = ranked(problem, profiles, refits, moved)
     progress("where it fails")
     where = locate(problem, train)
     law = _law(problem, ranking, progress)
@@ -149,118 +147,6 @@ def _scanned(problem: Problem) -> list[Profile]:
     ]  # fmt: skip
     at = problem.linearised
     return scan(problem.whole, base.windows, base.unknowns, base.point, absent, at)
-
-
-def _ranking(
-    problem: Problem, profiles: list[Profile], refits: list[Refit], moved: list[Shift]
-) -> tuple[Ranked, ...]:
-    """All candidates, best first.
-
-    Refits, among them shifts of parameters, come first, then the refits that the held-out
-    recording refuses, then the rest by the scan.
-    """
-    by_name = {profile.candidate.name: profile for profile in profiles}
-    group = tie_group(refits, by_name) if refits else []
-    names = [each.candidate.name for each in group]
-    tied = {name: tuple(n for n in names if n != name) for name in names}
-    rows = {r.candidate.name: _refitted(problem, r, by_name, tied) for r in refits}
-    order = [*names, *(name for name in rows if name not in names)]
-    followed = [rows[name] for name in order if predicts_row(rows[name])]
-    refused = [rows[name] for name in order if not predicts_row(rows[name])]
-    rest = [_shifted(shift) for shift in moved if shift.candidate.name not in rows]
-    rest += [_scanned_row(problem, p) for p in profiles if p.candidate.name not in rows]
-    rest.sort(key=lambda row: -row.drop_train)
-    asked = (*followed, *refused, *rest)
-    return (*asked, *_not_asked(problem, {row.candidate.name for row in asked}))
-
-
-def _not_asked(problem: Problem, asked: set[str]) -> list[Ranked]:
-    """Causes of the rig's plant without a row yet: measured here, or there already.
-
-    Where the recording measures what a cause produces, the cause has no place.
-    """
-    nothing = float("nan")
-    return [
-        Ranked(
-            candidate=candidate,
-            kind=candidate.cause.kind,
-            size={},
-            drop_train=nothing,
-            drop_validation=nothing,
-            tied_with=(),
-            compensable=nothing,
-            decided_by=DecidedBy.NOT_APPLICABLE,
-            accepted=False,
-            reasons=(_reason_not_asked(problem, candidate),),
-        )
-        for name, candidate in problem.rig.plant.candidates.items()
-        if name not in asked
-    ]
-
-
-def _reason_not_asked(problem: Problem, candidate: Candidate) -> str:
-    if candidate.name not in problem.whole.candidates:
-        return "not applicable: measured"
-    if not problem.rig.plant.ready_for(candidate):
-        return f"nothing without {candidate.member}.{candidate.cause.needs}"
-    return "there already"
-
-
-def predicts_row(row: Ranked) -> bool:
-    """False where the held-out recording refuses a refit."""
-    return HELD_OUT_REASON not in row.reasons
-
-
-def _refitted(
-    problem: Problem, each: Refit, profiles: dict[str, Profile], tied: dict[str, tuple[str, ...]]
-) -> Ranked:
-    against = reasons_against(problem.base, each)
-    profile = profiles.get(each.candidate.name)
-    return Ranked(
-        candidate=each.candidate,
-        kind=Kind.EFFECT if profile else Kind.PARAMETER,
-        size=each.size,
-        drop_train=each.drop_train,
-        drop_validation=each.drop_validation,
-        tied_with=tied.get(each.candidate.name, ()),
-        compensable=profile.compensation if profile else 1.0,
-        decided_by=DecidedBy.REFIT,
-        accepted=not against,
-        reasons=against,
-        fit=each.fit,
-    )
-
-
-def _shifted(shift: Shift) -> Ranked:
-    """A shift that was not refitted counts by what freeing it would bring."""
-    stays = (f"{shift.name} stays within {LEAVES_PRIOR:g} deviations of its prior",)
-    return Ranked(
-        candidate=shift.candidate,
-        kind=Kind.PARAMETER,
-        size={shift.name: shift.size},
-        drop_train=shift.drop if shift.leaves else 0.0,
-        drop_validation=float("nan"),
-        tied_with=(),
-        compensable=1.0,
-        decided_by=DecidedBy.SCAN,
-        accepted=False,
-        reasons=("only a shift of a fitted parameter",) if shift.leaves else stays,
-    )
-
-
-def _scanned_row(problem: Problem, profile: Profile) -> Ranked:
-    return Ranked(
-        candidate=profile.candidate,
-        kind=Kind.EFFECT,
-        size={},
-        drop_train=profile.drop / problem.misfit,
-        drop_validation=float("nan"),
-        tied_with=(),
-        compensable=profile.compensation,
-        decided_by=DecidedBy.SCAN,
-        accepted=False,
-        reasons=("not among the best of the scan",),
-    )
 
 
 def _law(problem: Problem, ranking: tuple[Ranked, ...], progress: Progress) -> Law | None:
