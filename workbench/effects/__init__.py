@@ -2,29 +2,43 @@
 
 from workbench.effects.bristle_friction import BristleFriction
 from workbench.effects.five_port_valve import FivePortValve
-from workbench.effects.forces import ConstantForce, EndCushion, EndStops, SpringForce, Weight
+from workbench.effects.forces import (
+    ConstantForce,
+    EndCushion,
+    EndStops,
+    RodEnd,
+    SpringForce,
+    Weight,
+)
 from workbench.effects.leaks import ChamberLeak, PistonLeak
+from workbench.effects.proportional_valve import ProportionalValve
 from workbench.effects.sensor_offset import (
     PositionSensorOffset,
     PressureSensorOffset,
 )
 from workbench.effects.stribeck_friction import StribeckFriction
 from workbench.effects.supply_droop import SupplyDroop
-from workbench.effects.valve_command import CommandDelay, DeadZone, ValveLag, ValveOffset
+from workbench.effects.timing import ClockDrift, CommandDelay, PacketPause, SensorDelay
+from workbench.effects.valve_command import DeadZone, ValveLag, ValveOffset
 from workbench.effects.wall_heat import WallHeat
 
 CATALOGUE = (
     BristleFriction,
     ChamberLeak,
+    ClockDrift,
     CommandDelay,
     ConstantForce,
     DeadZone,
     EndCushion,
     EndStops,
     FivePortValve,
+    PacketPause,
     PistonLeak,
     PositionSensorOffset,
     PressureSensorOffset,
+    ProportionalValve,
+    RodEnd,
+    SensorDelay,
     SpringForce,
     StribeckFriction,
     SupplyDroop,

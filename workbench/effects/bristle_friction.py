@@ -39,6 +39,26 @@ def blend(deflection: Expression, velocity: Expression, limit: Expression) -> Ex
     return ca.if_else(velocity * deflection > 0, rising, 0.0)
 
 
+@dataclass(frozen=True)
+class ElastoPlastic:
+    """A bristle that bends back without loss before it slides (F5 of paper 002): no creep."""
+
+    def __call__(
+        self, deflection: Expression, velocity: Expression, limit: Expression
+    ) -> Expression:
+        return blend(deflection, velocity, limit)
+
+
+@dataclass(frozen=True)
+class LuGre:
+    """A bristle that slides a little at any speed: alpha = 1, which creeps under small loads."""
+
+    def __call__(
+        self, deflection: Expression, velocity: Expression, limit: Expression
+    ) -> Expression:
+        return 1.0
+
+
 @dataclass(frozen=True, kw_only=True)
 class BristleFriction(StribeckFriction):
     """Stribeck friction, of which ``presliding_share`` acts through an elastic bristle.
@@ -53,7 +73,7 @@ class BristleFriction(StribeckFriction):
     out with its forces.
 
     Source: paper 002 Eqs. 9 to 14 and Table 5 (F5; erratum E002-6: magnitudes for v < 0).  Law
-    selection by share: architecture.md section 4.
+    selection by share: architecture.md section 4.  ``plasticity`` is alpha: LuGre is F5 with 1.
     """
 
     causes = (
@@ -69,6 +89,8 @@ class BristleFriction(StribeckFriction):
             source="paper 002 Eqs. 9 to 12 (F5)",
         ),
     )
+
+    plasticity: ElastoPlastic | LuGre = ElastoPlastic()
 
     presliding_share: Expression = strength(typical=1.0, upper=1.0, relative_deviation=0.0)
 
@@ -97,5 +119,5 @@ class BristleFriction(StribeckFriction):
         static_n = self._static_force_n(now) + NEGLIGIBLE_FORCE_N
         relative = (self.dry_force_n(now) + NEGLIGIBLE_FORCE_N) / static_n
         limit_m = self.breakaway_deflection_m * ca.fmax(relative, LEAST_DEFLECTION)
-        plastic = blend(z, velocity_m_s, limit_m) * ca.fabs(velocity_m_s) * z / limit_m
+        plastic = self.plasticity(z, velocity_m_s, limit_m) * ca.fabs(velocity_m_s) * z / limit_m
         return velocity_m_s - plastic

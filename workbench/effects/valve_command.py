@@ -1,4 +1,4 @@
-"""What happens to a valve's command before it opens anything: offset, lag, delay, dead zone."""
+"""What happens to a valve's command before it opens anything: offset, lag, dead zone."""
 
 from __future__ import annotations
 
@@ -159,36 +159,3 @@ class DeadZone(Effect):
         if offset_v < 0:
             return float(centre_v - w + offset_v * (below_v - w) / below_v)
         return float(centre_v)
-
-
-@dataclass(frozen=True, kw_only=True)
-class CommandDelay(Effect):
-    """A pure delay of a command, u(t - T), applied to the sampled sequence.
-
-    Between samples the command is interpolated linearly, so any T >= 0 is possible; at T = 0 the
-    sequence is unchanged.
-
-    Source: papers 000 and 001 (1 ms each way), 003 (3 ms); physics.md section 6 (valve_delay).
-    """
-
-    causes = (
-        Cause(
-            name="command_delay",
-            strength="delay_s",
-            balance=Balance.TIMING,
-            drivers=("rate of the command",),
-            kinked=True,
-            tolerated=(2e-3, 3e-3),  # a 100 Hz valve and a 1 ms sensor, neglected in paper 002
-            shown_by="fast command steps and a multi-sine up to 20 Hz",
-            source="papers 000, 001, 003; physics.md section 6 (valve_delay)",
-        ),
-    )
-
-    signal: str
-    delay_s: Expression = strength(typical=15e-3, upper=0.2)
-
-    def resample(self, channel: str, values: np.ndarray, sample_time_s: float) -> np.ndarray:
-        if channel != self.signal or self.delay_s == 0.0:
-            return values
-        samples = np.arange(len(values), dtype=float)
-        return np.interp(samples - float(self.delay_s) / sample_time_s, samples, values)
