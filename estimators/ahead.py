@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from workbench.contracts import Estimate
-from workbench.effects.timing import CommandDelay
+from workbench.effects.valve_command import CommandDelay
 from workbench.plant import Plant
 
 

@@ -15,7 +15,7 @@ U_OFF, W = 5.25, 0.75
 R_O, C2, SPAN = 1e-3, 1e-4, 4.75
 C1 = (2 * R_O - C2) / SPAN
 CHARGING, DISCHARGING = 0.62, 0.55
-F_S, F_C, I, K_TANH, V_S, C_V = 20.0, 13.3, 5, 1580.0, 2.54e-3, 87.56
+F_S, F_C, EXPONENT, K_TANH, V_S, C_V = 20.0, 13.3, 5, 1580.0, 2.54e-3, 87.56
 STOP, STOP_DAMPING = 2e6, 2e3
 C_SUB = np.sqrt(2 * K / (R * (K - 1)))
 C_CHK = np.sqrt(K / R * (2 / (K + 1)) ** ((K + 1) / (K - 1)))
@@ -43,7 +43,9 @@ def p_in(du):
 
 
 def friction(v):
-    return (F_C + (F_S - F_C) * np.exp(-((abs(v) / V_S) ** I))) * np.tanh(K_TANH * v) + C_V * v
+    return (F_C + (F_S - F_C) * np.exp(-((abs(v) / V_S) ** EXPONENT))) * np.tanh(
+        K_TANH * v
+    ) + C_V * v
 
 
 def flow(du, p, t):

@@ -18,8 +18,8 @@ from workbench.effects.sensor_offset import (
 )
 from workbench.effects.stribeck_friction import StribeckFriction
 from workbench.effects.supply_droop import SupplyDroop
-from workbench.effects.timing import ClockDrift, CommandDelay, PacketPause, SensorDelay
-from workbench.effects.valve_command import DeadZone, ValveLag, ValveOffset
+from workbench.effects.timing import ClockDrift, PacketPause, SensorDelay
+from workbench.effects.valve_command import CommandDelay, DeadZone, ValveLag, ValveOffset
 from workbench.effects.wall_heat import WallHeat
 
 CATALOGUE = (

@@ -161,7 +161,7 @@ class ProportionalValve(Effect):
     gas_constant_j_kg_k: float = GAS_CONSTANT_J_KG_K
 
     underlap_v: Expression = strength(typical=0.75, upper=1.5, deviation=0.02)
-    area_shape_share: Expression = strength(typical=1.0, lower=-0.5, upper=1.5)
+    area_shape_share: Expression = strength(typical=1.0, upper=1.5)
     discharge_asymmetry: Expression = strength(typical=0.15, lower=-0.5, upper=0.5, deviation=0.02)
     exhaust_restriction_share: Expression = strength(typical=0.5, upper=0.9)
     supply_restriction_share: Expression = strength(typical=0.5, upper=0.9)

@@ -18,51 +18,27 @@ SLACK = 1e-6  # of a sample: times are multiples of it up to rounding
 
 @dataclass(frozen=True, kw_only=True)
 class Timing(Effect):
-    """Signals that arrive later than they are sent.
+    """Signals, commands or outputs, that arrive later than they are sent.
 
-    ``signals`` names commands and outputs.  Between samples a signal is interpolated linearly;
-    what was sent before the first sample is the first sample.
+    Between samples a signal is interpolated linearly; what was sent before the first sample is the
+    first sample.
 
     Source: architecture.md section 4 (causes in time).
     """
 
-    signals: tuple[str, ...]
+    def acts_on(self, channel: str) -> bool:
+        """True for the signals that it delays."""
+        return channel in self.signals
 
     def sent_at_s(self, time_s: np.ndarray) -> np.ndarray:
         """When what arrives at these times was sent; never later than that."""
         return time_s
 
     def resample(self, channel: str, values: np.ndarray, sample_time_s: float) -> np.ndarray:
-        if channel not in self.signals or self.absent:
+        if not self.acts_on(channel) or self.absent:
             return values
         samples = np.arange(len(values), dtype=float)
         return np.interp(self.sent_at_s(samples * sample_time_s) / sample_time_s, samples, values)
-
-
-@dataclass(frozen=True, kw_only=True)
-class CommandDelay(Timing):
-    """A pure delay of a command, u(t - T); at T = 0 the sequence is unchanged.
-
-    Source: papers 000 and 001 (1 ms each way), 003 (3 ms); physics.md section 6 (valve_delay).
-    """
-
-    causes = (
-        Cause(
-            name="command_delay",
-            strength="delay_s",
-            balance=Balance.TIMING,
-            drivers=("rate of the command",),
-            kinked=True,
-            tolerated=(2e-3, 3e-3),  # a 100 Hz valve and a 1 ms sensor, neglected in paper 002
-            shown_by="fast command steps and a multi-sine up to 20 Hz",
-            source="papers 000, 001, 003; physics.md section 6 (valve_delay)",
-        ),
-    )
-
-    delay_s: Expression = strength(typical=15e-3, upper=0.2)
-
-    def sent_at_s(self, time_s: np.ndarray) -> np.ndarray:
-        return time_s - float(self.delay_s)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,6 +50,7 @@ class SensorDelay(Timing):
     Source: paper 000 (1 ms each way); physics.md 2.1 and section 6 (comm_delay).
     """
 
+    signals: tuple[str, ...]
     delay_s: Expression = strength(typical=1e-3, upper=0.2)
 
     def sent_at_s(self, time_s: np.ndarray) -> np.ndarray:
@@ -105,6 +82,7 @@ class PacketPause(Timing):
         ),
     )
 
+    signals: tuple[str, ...]
     redraw_hz: Expression = strength(typical=10.0, upper=30.0)
     pause_s: Expression = form(20e-3, lower=0.0, upper=0.1, relative_deviation=0.2)
     resynchronisation_s: Expression = form(10e-3, lower=0.0, upper=0.1)
@@ -131,6 +109,7 @@ class ClockDrift(Timing):
     Source: observed in paper 001 (growing lag); physics.md section 6 (clock_drift).
     """
 
+    signals: tuple[str, ...]
     drift_share: Expression = strength(typical=1e-3, upper=1e-2)
 
     def sent_at_s(self, time_s: np.ndarray) -> np.ndarray:
@@ -140,6 +119,6 @@ class ClockDrift(Timing):
 def sent_at_s(members: Sequence[Effect], channel: str, time_s: np.ndarray) -> np.ndarray:
     """When what arrives at these times on a channel was sent, by all causes in time together."""
     for member in reversed(members):
-        if isinstance(member, Timing) and channel in member.signals and not member.absent:
+        if isinstance(member, Timing) and member.acts_on(channel) and not member.absent:
             time_s = member.sent_at_s(time_s)
     return time_s

@@ -1,4 +1,4 @@
-"""What happens to a valve's command before it opens anything: offset, lag, dead zone."""
+"""What happens to a valve's command before it opens anything: offset, lag, delay, dead zone."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from workbench.effect import (
     form,
     strength,
 )
+from workbench.effects.timing import Timing
 
 FADING_V = 0.01  # half-width of a band below which its centre loses its meaning
 
@@ -159,3 +160,33 @@ class DeadZone(Effect):
         if offset_v < 0:
             return float(centre_v - w + offset_v * (below_v - w) / below_v)
         return float(centre_v)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CommandDelay(Timing):
+    """A pure delay of a command, u(t - T); at T = 0 the sequence is unchanged.
+
+    Source: papers 000 and 001 (1 ms each way), 003 (3 ms); physics.md section 6 (valve_delay).
+    """
+
+    causes = (
+        Cause(
+            name="command_delay",
+            strength="delay_s",
+            balance=Balance.TIMING,
+            drivers=("rate of the command",),
+            kinked=True,
+            tolerated=(2e-3, 3e-3),  # a 100 Hz valve and a 1 ms sensor, neglected in paper 002
+            shown_by="fast command steps and a multi-sine up to 20 Hz",
+            source="papers 000, 001, 003; physics.md section 6 (valve_delay)",
+        ),
+    )
+
+    signal: str
+    delay_s: Expression = strength(typical=15e-3, upper=0.2)
+
+    def acts_on(self, channel: str) -> bool:
+        return channel == self.signal
+
+    def sent_at_s(self, time_s: np.ndarray) -> np.ndarray:
+        return time_s - float(self.delay_s)

@@ -144,7 +144,7 @@ class CrrCylinder:
             for key in ("command_delay", "valve_lag", "valve_offset", "valve_dead_zone")
         }
         return (
-            CommandDelay(name=name["command_delay"], signals=(signal,), delay_s=NETWORK_S),
+            CommandDelay(name=name["command_delay"], signal=signal, delay_s=NETWORK_S),
             ValveLag(name=name["valve_lag"], signal=signal, initial_v=OFFSET_V),
             ValveOffset(
                 name=name["valve_offset"], signal=signal, offset_v=OFFSET_V - NOMINAL_CENTRE_V

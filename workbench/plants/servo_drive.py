@@ -96,7 +96,7 @@ def servo_drive() -> Plant:
             Chamber(name=b, side=-1, dead_volume_m3=5.525e-5, **chamber),
         ),
         effects=(
-            CommandDelay(name="command_delay", signals=(COMMAND,)),
+            CommandDelay(name="command_delay", signal=COMMAND),
             ValveLag(name="valve_lag", signal=COMMAND, initial_v=CENTRE_V),
             ValveOffset(name="valve_offset", signal=COMMAND),
             DeadZone(
