@@ -10,9 +10,11 @@ from workbench.effects.forces import (
     SpringForce,
     Weight,
 )
+from workbench.effects.joints import JointFriction, LinkGravity
 from workbench.effects.leaks import ChamberLeak, PistonLeak
 from workbench.effects.proportional_valve import ProportionalValve
 from workbench.effects.sensor_offset import (
+    AngleSensorOffset,
     PositionSensorOffset,
     PressureSensorOffset,
 )
@@ -23,6 +25,7 @@ from workbench.effects.valve_command import CommandDelay, DeadZone, ValveLag, Va
 from workbench.effects.wall_heat import WallHeat
 
 CATALOGUE = (
+    AngleSensorOffset,
     BristleFriction,
     ChamberLeak,
     ClockDrift,
@@ -32,6 +35,8 @@ CATALOGUE = (
     EndCushion,
     EndStops,
     FivePortValve,
+    JointFriction,
+    LinkGravity,
     PacketPause,
     PistonLeak,
     PositionSensorOffset,
