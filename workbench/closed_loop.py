@@ -7,14 +7,14 @@ what happens between two commands is in the record.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from time import perf_counter
 
 import numpy as np
 
+from workbench.arrivals import Arrivals
 from workbench.contracts import Controller, Estimator
-from workbench.effects.timing import sent_at_s
 from workbench.plant import Plant
 from workbench.recording import Recording
 
@@ -152,47 +152,22 @@ def _ticks(controller: Controller, estimator: Estimator, sample_time_s: float) -
     return every
 
 
-class _Line:
-    """Signals on their way: what is sent at each sample, and what of it has arrived."""
-
-    def __init__(self, plant: Plant, names: Sequence[str], n: int, dt: float) -> None:
-        time_s = dt * np.arange(n)
-        sent_s = [sent_at_s(plant.members, name, time_s) for name in names]
-        self.place = np.clip(np.reshape(sent_s, (len(names), n)) / dt + 1.0, 0.0, None)
-        self.sent = np.zeros((n + 2, len(names)))
-
-    def arrived(self, values: np.ndarray, k: int) -> np.ndarray:
-        """What arrives at sample k, where ``values`` are sent; row 0 is what was there before."""
-        self.sent[k + 1 :] = values
-        first = np.floor(self.place[:, k] + 1e-9).astype(int)
-        share = np.clip(self.place[:, k] - first, 0.0, 1.0)
-        column = np.arange(len(first))
-        return (1.0 - share) * self.sent[first, column] + share * self.sent[first + 1, column]
-
-
 class _Plant:
     """The plant's step on arrays, with the causes in time on its commands and outputs."""
 
     def __init__(self, plant: Plant, sample_time_s: float, n: int) -> None:
         self.name, self.sample_time_s = plant.name, sample_time_s
         model, (u, d, p) = plant.model, plant.nominal
-        self.down = _Line(plant, model.commands, n, sample_time_s)
-        self.up = _Line(plant, model.measured, n, sample_time_s)
-        self.down.sent[0] = u
+        self.down = Arrivals(plant.members, model.commands, n, sample_time_s, before=u)
+        self.received = Arrivals(plant.members, model.measured, n, sample_time_s)
         self.step, self.f = model.compiled_step(sample_time_s), model.f
         self.u, self.d, self.p = u, d, p
 
     def outputs(self, x: np.ndarray) -> np.ndarray:
         return self.f(x, self.u, self.d, self.p)[1].full().ravel()
 
-    def received(self, y: np.ndarray, k: int) -> np.ndarray:
-        """What the computer gets of the outputs at sample k."""
-        if k == 0:
-            self.up.sent[0] = y
-        return self.up.arrived(y, k)
-
     def __call__(self, x: np.ndarray, command: np.ndarray, k: int) -> np.ndarray:
-        x = self.step(x, self.down.arrived(command, k), self.d, self.p).full().ravel()
+        x = self.step(x, self.down(command, k), self.d, self.p).full().ravel()
         if not np.isfinite(x).all():
             at_s = (k + 1) * self.sample_time_s
             raise ArithmeticError(f"{self.name}: the closed loop is not finite at {at_s:.4g} s")

@@ -73,6 +73,37 @@ class Joint(Part):
 
 
 @dataclass(frozen=True, kw_only=True)
+class HeldJoint(Joint):
+    """A joint whose motion another computer integrates: angle and velocity are measured inputs.
+
+    What it collects is the torque to be sent there, without the inertia of the link (E001-5).
+
+    Source: paper 001 Eq. 4 and its co-simulation; physics.md 2.2.
+    """
+
+    linkage: str = ""
+
+    def states(self) -> Iterator[State]:
+        return iter(())
+
+    def rates(self, now: Conditions, received: Received) -> dict[str, Expression]:
+        return {}
+
+
+@dataclass(frozen=True, kw_only=True)
+class TorqueSource(Part):
+    """A torque on a joint that is a measured input, for example from another computer.
+
+    Source: paper 001, co-simulation.
+    """
+
+    joint: str
+
+    def terms(self, now: Conditions) -> Iterator[Torque]:
+        yield Torque(self.joint, now[self.name].torque_n_m)
+
+
+@dataclass(frozen=True, kw_only=True)
 class JointRod(Part):
     """The rod of a cylinder between two links, at a and b from the joint.
 
@@ -142,7 +173,7 @@ class Link(Part):
     mass_kg: Expression = form(0.5, lower=1e-3, relative_deviation=0.05)
     length_m: Expression = form(0.3048, lower=1e-3)
     hub_inertia_kg_m2: Expression = form(0.003, relative_deviation=0.05)
-    added_mass_kg: Expression = strength(typical=0.3, lower=-0.3, upper=3.0)
+    added_mass_kg: Expression = strength(typical=0.3, upper=3.0)
 
     def derive(self, now: Conditions) -> dict[str, Expression]:
         tip_kg_m2 = self.added_mass_kg * self.length_m**2

@@ -1,6 +1,7 @@
 """The plants of the papers.  A new plant is one file here and one line below."""
 
 from workbench.plants.crr_arm import crr_arm
+from workbench.plants.crr_leg import crr_leg
 from workbench.plants.crr_rig import crr_rig
 from workbench.plants.cylinder_bench import cylinder_bench
 from workbench.plants.servo_drive import servo_drive
@@ -12,4 +13,5 @@ PLANTS = {
     "cylinder_bench": cylinder_bench,
     "crr_rig": crr_rig,
     "crr_arm": crr_arm,
+    "crr_leg": crr_leg,
 }

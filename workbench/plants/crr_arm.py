@@ -25,7 +25,7 @@ from workbench.effects import (
     SensorDelay,
     SupplyDroop,
 )
-from workbench.linkage import Joint, JointRod, Link
+from workbench.linkage import HeldJoint, Joint, JointRod, Link, TorqueSource
 from workbench.plant import Plant, Signal
 from workbench.plants.crr_cylinder import NETWORK_S, SUPPLY_PA, CrrCylinder, surroundings
 
@@ -42,6 +42,7 @@ ROD = JointRod(
 )
 CYLINDER = CrrCylinder(stroke_m=STROKE_M, start_m=float(ROD.position_m(START_RAD)))
 OUTPUTS = ("joint.angle_rad", *CYLINDER.pressures)
+MOTION = ("joint.angle_rad", "joint.velocity_rad_s")
 NETWORK = (CYLINDER.command.name, *OUTPUTS)
 
 
@@ -83,4 +84,38 @@ def crr_arm() -> Plant:
         optional_inputs=(Signal("supply.pressure_pa", nominal=SUPPLY_PA),),
         measured=OUTPUTS,
         optional_outputs=("joint.velocity_rad_s",),
+    )
+
+
+def crr_arm_actuator() -> Plant:
+    """The half on the real-time computer: cylinder and valve, the joint's motion as input."""
+    angle, velocity = MOTION
+    return Plant(
+        name="crr_arm_actuator",
+        parts=(
+            *surroundings(),
+            ROD,
+            HeldJoint(name="joint", rod="rod"),
+            *CYLINDER.parts(),
+        ),
+        effects=CYLINDER.effects(),
+        commands=(CYLINDER.command,),
+        measured_inputs=(Signal(angle, nominal=START_RAD), Signal(velocity, nominal=0.0)),
+        measured=("joint.torque_n_m", *CYLINDER.pressures),
+    )
+
+
+def crr_arm_engine() -> Plant:
+    """The half in the rigid-body engine: link, gravity and stops, the torque as input."""
+    return Plant(
+        name="crr_arm_engine",
+        parts=(
+            ROD,
+            Joint(name="joint", rod="rod", linkage="link", initial_angle_rad=START_RAD),
+            Link(name="link", joint="joint"),
+            TorqueSource(name="drive", joint="joint"),
+        ),
+        effects=(joint_stops(ROD, RANGE_RAD), *_link_effects()),
+        measured_inputs=(Signal("drive.torque_n_m", nominal=0.0),),
+        measured=MOTION,
     )
