@@ -253,6 +253,10 @@ class Effect:
             for k, null in nulls.items()
         )
 
+    def reduced(self) -> Effect:
+        """The same effect without what is absent in it, where that spares it a state."""
+        return self
+
     def states(self) -> Iterable[State]:
         """States this effect adds, for example a bristle deflection or a valve lag."""
         return ()

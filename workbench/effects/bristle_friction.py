@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import casadi as ca
 
@@ -96,6 +96,13 @@ class BristleFriction(StribeckFriction):
 
     breakaway_deflection_m: Expression = form(40e-6, lower=1e-6, upper=1e-3)
     bristle_time_s: Expression = form(45e-6, lower=0.0, upper=1e-2)
+
+    def reduced(self) -> StribeckFriction:
+        """Without presliding there is no bristle."""
+        if not isinstance(self.presliding_share, int | float) or self.presliding_share != 0.0:
+            return self
+        kept = (f.name for f in fields(StribeckFriction))
+        return StribeckFriction(**{name: getattr(self, name) for name in kept})
 
     def states(self) -> Iterator[State]:
         yield State("deflection_m", initial=0.0, scale=2e-5, tolerance=1e-8)
