@@ -74,6 +74,16 @@ def test_the_composed_rig_has_the_rates_and_outputs_of_the_flat_one(rig):
         np.testing.assert_array_equal(outputs.full().ravel(), x[[0, 2, 4]])
 
 
+def test_a_lean_rig_has_no_bristle_and_the_same_friction():
+    full = PLANT_MODELS["crr_rig"]
+    sliding = full.with_values({"friction.presliding_share": 1.0}).lean()
+
+    assert "friction.deflection_m" in full.lean(keep=("friction",)).model.states
+    assert "friction.deflection_m" in sliding.model.states
+    assert "friction.deflection_m" not in full.lean().model.states
+    assert full.lean().values.items() <= full.values.items()
+
+
 @pytest.mark.parametrize(
     ("height_mm", "area_mm2"), [(0.1, 0.058726), (0.5, 0.614185), (1.0, 1.570796), (2.0, 3.141593)]
 )

@@ -175,18 +175,20 @@ class Link(Part):
     hub_inertia_kg_m2: Expression = form(0.003, relative_deviation=0.05)
     added_mass_kg: Expression = strength(typical=0.3, upper=3.0)
 
-    def derive(self, now: Conditions) -> dict[str, Expression]:
+    @property
+    def inertia_kg_m2(self) -> Expression:
+        """J about the joint."""
         tip_kg_m2 = self.added_mass_kg * self.length_m**2
+        return self.mass_kg * self.length_m**2 / 3.0 + self.hub_inertia_kg_m2 + tip_kg_m2
+
+    def derive(self, now: Conditions) -> dict[str, Expression]:
         angle_rad = now[self.joint].angle_rad
         moment_kg_m = (self.mass_kg / 2.0 + self.added_mass_kg) * self.length_m
         return {
-            "inertia_kg_m2": self.mass_kg * self.length_m**2 / 3.0
-            + self.hub_inertia_kg_m2
-            + tip_kg_m2,
             f"{self.joint}_along_kg_m": moment_kg_m * ca.cos(angle_rad),
             f"{self.joint}_across_kg_m": moment_kg_m * ca.sin(angle_rad),
         }
 
     def close(self, now: Conditions, received: Received) -> dict[str, Expression]:
-        acceleration = now[self.joint].torque_n_m / now[self.name].inertia_kg_m2
+        acceleration = now[self.joint].torque_n_m / self.inertia_kg_m2
         return {f"{self.joint}_acceleration_rad_s2": acceleration}
