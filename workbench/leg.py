@@ -98,35 +98,41 @@ class Leg(Part):
             balance=Balance.MOMENTUM,
             drivers=("acceleration", "angle"),
             kind=Kind.PARAMETER,
-            held="shank_kg",
+            held="shank_mass_kg",
             shown_by="slow sweep of each joint, and fast steps",
             source="physics.md section 6 (payload)",
         ),
     )
 
     joints: tuple[str, str, str]
-    shoulder_kg: Expression = form(1.2, lower=1e-3, relative_deviation=0.05)
-    thigh_kg: Expression = form(0.9, lower=1e-3, relative_deviation=0.05)
-    shank_kg: Expression = form(0.5, lower=1e-3, relative_deviation=0.05)
+    shoulder_mass_kg: Expression = form(1.2, lower=1e-3, relative_deviation=0.05)
+    thigh_mass_kg: Expression = form(0.9, lower=1e-3, relative_deviation=0.05)
+    shank_mass_kg: Expression = form(0.5, lower=1e-3, relative_deviation=0.05)
     added_mass_kg: Expression = strength(typical=0.3, upper=3.0)
     offset_m: Expression = form(1.608 * INCH_M, lower=-1.0, upper=1.0)
-    shoulder_m: Expression = form(5.750 * INCH_M, lower=1e-3)
-    thigh_m: Expression = form(6.828 * INCH_M, lower=1e-3)
-    shank_m: Expression = form(12.00 * INCH_M, lower=1e-3)
+    shoulder_length_m: Expression = form(5.750 * INCH_M, lower=1e-3)
+    thigh_length_m: Expression = form(6.828 * INCH_M, lower=1e-3)
+    shank_length_m: Expression = form(12.00 * INCH_M, lower=1e-3)
     shoulder_radius_m: Expression = form(30e-3)
     thigh_radius_m: Expression = form(25e-3)
     shank_radius_m: Expression = form(15e-3)
 
     @property
     def geometry(self) -> LegGeometry:
-        return LegGeometry(self.offset_m, self.shoulder_m, self.thigh_m, self.shank_m)
+        lengths = (self.shoulder_length_m, self.thigh_length_m, self.shank_length_m)
+        return LegGeometry(self.offset_m, *lengths)
 
     def mass_matrix(self, angles_rad: Sequence[Expression]) -> ca.SX:
         """M(q), shape (3, 3), in kg m2."""
         _, second, third = angles_rad
         c2, c3, c23 = ca.cos(second), ca.cos(third), ca.cos(second + third)
-        m1, m2, m3, foot = self.shoulder_kg, self.thigh_kg, self.shank_kg, self.added_mass_kg
-        a1, a2, a3 = self.shoulder_m, self.thigh_m, self.shank_m
+        m1, m2, m3, foot = (
+            self.shoulder_mass_kg,
+            self.thigh_mass_kg,
+            self.shank_mass_kg,
+            self.added_mass_kg,
+        )
+        a1, a2, a3 = self.shoulder_length_m, self.thigh_length_m, self.shank_length_m
         (t1, _), (t2, x2), (t3, x3) = self._own_inertias()
         knee, end = a1 + a2 * c2, a1 + a2 * c2 + a3 * c23
         m11 = m1 * (a1 / 2) ** 2 + t1
@@ -140,9 +146,9 @@ class Leg(Part):
     def _own_inertias(self) -> tuple[tuple[Expression, Expression], ...]:
         """Of each link about its centre: across, m (3 r^2 + L^2)/12, and along its axis."""
         links = (
-            (self.shoulder_kg, self.shoulder_radius_m, self.shoulder_m),
-            (self.thigh_kg, self.thigh_radius_m, self.thigh_m),
-            (self.shank_kg, self.shank_radius_m, self.shank_m),
+            (self.shoulder_mass_kg, self.shoulder_radius_m, self.shoulder_length_m),
+            (self.thigh_mass_kg, self.thigh_radius_m, self.thigh_length_m),
+            (self.shank_mass_kg, self.shank_radius_m, self.shank_length_m),
         )
         return tuple((m * (3 * r**2 + length**2) / 12, m * r**2 / 2) for m, r, length in links)
 
@@ -157,8 +163,10 @@ class Leg(Part):
     def derive(self, now: Conditions) -> dict[str, Expression]:
         angles = [now[joint].angle_rad for joint in self.joints]
         second, both = angles[1], angles[1] + angles[2]
-        thigh = (self.thigh_kg / 2 + self.shank_kg + self.added_mass_kg) * self.thigh_m
-        shank = (self.shank_kg / 2 + self.added_mass_kg) * self.shank_m
+        thigh = (
+            self.thigh_mass_kg / 2 + self.shank_mass_kg + self.added_mass_kg
+        ) * self.thigh_length_m
+        shank = (self.shank_mass_kg / 2 + self.added_mass_kg) * self.shank_length_m
         moments = {}
         for key, wave in (("along", ca.cos), ("across", ca.sin)):
             lower = -shank * wave(both)
