@@ -13,11 +13,10 @@ from time import perf_counter
 
 import numpy as np
 
+from workbench.arrivals import Arrivals
 from workbench.contracts import Controller, Estimator
 from workbench.plant import Plant
 from workbench.recording import Recording
-
-MEMORY = 512  # past samples that a delay may reach back
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,8 +120,9 @@ def close_loop(
     command, estimate, ticks, rows = controller.start(), None, [], []
     for k in range(n):
         y = plant_step.outputs(x)
+        read = plant_step.received(y, k)
         if k % every == 0:
-            seen = hardware.measured(plant, y, normal[k])
+            seen = hardware.measured(plant, read, normal[k])
             begun = perf_counter()
             estimate = estimator.start(seen) if estimate is None else estimate
             estimate = estimator.update(estimate, command.value, seen)
@@ -153,29 +153,21 @@ def _ticks(controller: Controller, estimator: Estimator, sample_time_s: float) -
 
 
 class _Plant:
-    """The plant's step on arrays; past commands are kept for what delays them."""
+    """The plant's step on arrays, with the causes in time on its commands and outputs."""
 
     def __init__(self, plant: Plant, sample_time_s: float, n: int) -> None:
         self.name, self.sample_time_s = plant.name, sample_time_s
         model, (u, d, p) = plant.model, plant.nominal
-        self.commands = [signal.name for signal in plant.commands]
-        self.late = [m for m in plant.members if getattr(m, "delay_s", 0.0) != 0.0]
-        self.sent = np.tile(u, (n + MEMORY, 1))
-        self.step, self.f, self.u, self.d, self.p = model.step(sample_time_s), model.f, u, d, p
+        self.down = Arrivals(plant.members, model.commands, n, sample_time_s, before=u)
+        self.received = Arrivals(plant.members, model.measured, n, sample_time_s)
+        self.step, self.f = model.compiled_step(sample_time_s), model.f
+        self.u, self.d, self.p = u, d, p
 
     def outputs(self, x: np.ndarray) -> np.ndarray:
         return self.f(x, self.u, self.d, self.p)[1].full().ravel()
 
     def __call__(self, x: np.ndarray, command: np.ndarray, k: int) -> np.ndarray:
-        self.sent[k + MEMORY] = command
-        for member in self.late:
-            past = self.sent[k + 1 : k + MEMORY + 1]
-            late = [
-                member.resample(name, column, self.sample_time_s)[-1]
-                for name, column in zip(self.commands, past.T, strict=True)
-            ]
-            command = np.array(late)
-        x = self.step(x, command, self.d, self.p).full().ravel()
+        x = self.step(x, self.down(command, k), self.d, self.p).full().ravel()
         if not np.isfinite(x).all():
             at_s = (k + 1) * self.sample_time_s
             raise ArithmeticError(f"{self.name}: the closed loop is not finite at {at_s:.4g} s")

@@ -66,6 +66,10 @@ class Force(Term):
     """A force on a body in N, positive towards growing position."""
 
 
+class Torque(Term):
+    """A torque on a joint in N m, positive towards growing angle."""
+
+
 class HeatFlow(Term):
     """Heat entering the gas of a chamber, in W."""
 
@@ -251,6 +255,10 @@ class Effect:
             isinstance(getattr(self, k), int | float) and getattr(self, k) == null
             for k, null in nulls.items()
         )
+
+    def reduced(self) -> Effect:
+        """The same effect without what is absent in it, where that spares it a state."""
+        return self
 
     def states(self) -> Iterable[State]:
         """States this effect adds, for example a bristle deflection or a valve lag."""

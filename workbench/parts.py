@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import casadi as ca
 import numpy as np
@@ -198,6 +199,17 @@ class Chamber(Part):
         travel_m = position_m if self.side > 0 else self.stroke_m - position_m
         return self.dead_volume_m3 * (1.0 + self.dead_volume_change) + self.area_m2 * travel_m
 
+    def temperature_k(self, own: SimpleNamespace, volume_m3: Expression) -> Expression:
+        """T = p V / (m R), of the chamber's own states."""
+        pressure_pa = ca.fmax(own.pressure_pa, LOWEST_PRESSURE_PA)
+        content_j_k = ca.fmax(own.mass_kg, LOWEST_MASS_KG) * self.gas_constant_j_kg_k
+        return ca.fmax(pressure_pa * volume_m3 / content_j_k, LOWEST_TEMPERATURE_K)
+
+    @property
+    def balance_exponent(self) -> Expression:
+        """What stands before enthalpy and work: kappa; 1 where the gas keeps its temperature."""
+        return HEAT_CAPACITY_RATIO
+
     def guess(self, seen: Mapping[str, np.ndarray]) -> dict[str, tuple[np.ndarray | float, float]]:
         pressure_pa = seen.get(f"{self.name}.pressure_pa")
         position_m = seen.get(f"{self.body}.position_m")
@@ -213,13 +225,11 @@ class Chamber(Part):
         own, body = now[self.name], now[self.body]
         dead_m3 = self.dead_volume_m3 * (1.0 + self.dead_volume_change)
         volume_m3 = ca.fmax(self.volume_m3(body.position_m), 0.1 * dead_m3)
-        pressure_pa = ca.fmax(own.pressure_pa, LOWEST_PRESSURE_PA)
-        content_j_k = ca.fmax(own.mass_kg, LOWEST_MASS_KG) * self.gas_constant_j_kg_k
         travel_m = body.position_m if self.side > 0 else self.stroke_m - body.position_m
         return {
             "volume_m3": volume_m3,
             "volume_rate_m3_s": self.side * self.area_m2 * body.velocity_m_s,
-            "temperature_k": ca.fmax(pressure_pa * volume_m3 / content_j_k, LOWEST_TEMPERATURE_K),
+            "temperature_k": self.temperature_k(own, volume_m3),
             "length_m": travel_m,
             "area_m2": self.area_m2,
             "gas_constant_j_kg_k": self.gas_constant_j_kg_k,
@@ -229,12 +239,12 @@ class Chamber(Part):
         yield Force(self.body, self.side * self.area_m2 * now[self.name].pressure_pa)
 
     def rates(self, now: Conditions, received: Received) -> dict[str, Expression]:
-        own, got, kappa = now[self.name], received(self.name), HEAT_CAPACITY_RATIO
+        own, got, k = now[self.name], received(self.name), self.balance_exponent
         carried = sum(t.value * t.temperature_k for t in got if isinstance(t, MassFlow))
         energy_w = (
-            kappa * self.gas_constant_j_kg_k * carried
-            - kappa * own.pressure_pa * own.volume_rate_m3_s
-            + (kappa - 1.0) * total(got, HeatFlow)
+            k * self.gas_constant_j_kg_k * carried
+            - k * own.pressure_pa * own.volume_rate_m3_s
+            + (HEAT_CAPACITY_RATIO - 1.0) * total(got, HeatFlow)
         )
         return {"pressure_pa": energy_w / own.volume_m3, "mass_kg": total(got, MassFlow)}
 

@@ -128,10 +128,10 @@ class Plant:
         return self.with_values({c.strength: known[c.strength].null for c in candidates})
 
     def lean(self, keep: Iterable[str] = ()) -> Plant:
-        """The same plant without the absent effects, except the members named in ``keep``."""
+        """The same plant without what is absent, except in the members named in ``keep``."""
         kept = set(keep)
-        effects = tuple(e for e in self.effects if e.name in kept or not e.absent)
-        return replace(self, effects=effects)
+        effects = (e for e in self.effects if e.name in kept or not e.absent)
+        return replace(self, effects=tuple(e if e.name in kept else e.reduced() for e in effects))
 
     def __getstate__(self) -> dict[str, Any]:
         """All but the model, which another process builds again: its symbols do not travel."""

@@ -18,7 +18,8 @@ what is needed is evaluated (a CasADi switch), and the choice depends on the sta
 alone, so a run is reproducible sample by sample.
 
 The elimination is written out without pivoting.  That is safe here because the diagonal of
-I / (h gamma) - J dominates for small h, and it keeps the structural zeros of J.
+I / (h gamma) - J dominates for small h, and it keeps the structural zeros of J.  The order of the
+unknowns is chosen once, by the zeros alone, so that few are lost (minimum degree).
 
 Errors and speed are printed by ``pytest tests/benchmarks -s --benchmark-enable``.
 """
@@ -92,10 +93,12 @@ def single_step(symbols: tuple[ca.SX, ...], rates: ca.SX) -> ca.Function:
     h = ca.SX.sym("h")
     f, per_s = ca.Function("f", [x, u, d, p], [rates]), 1.0 / h
     W = ca.SX.eye(x.numel()) * (per_s / GAMMA) - ca.jacobian(rates, x)
-    lower, upper, inverse = _factorised(W)
+    order = _elimination_order(W.sparsity())
+    back = np.argsort(order).tolist()
+    lower, upper, inverse = _factorised(W[order, order])
 
     def solved(right: ca.SX) -> ca.SX:
-        return _solved(lower, upper, inverse, right)
+        return _solved(lower, upper, inverse, right[order])[back]
 
     k1 = solved(rates)
     k2 = solved(rates + 4.0 * per_s * k1)
@@ -103,6 +106,24 @@ def single_step(symbols: tuple[ca.SX, ...], rates: ca.SX) -> ca.Function:
     before = x + 2.0 * k1 + k3
     k4 = solved(f(before, u, d, p) + per_s * (k1 - k2 - 8.0 / 3.0 * k3))
     return ca.Function("single", [x, u, d, p, h], ca.cse([before + k4, k4]))
+
+
+def _elimination_order(sparsity: ca.Sparsity) -> list[int]:
+    """Rows in the order of fewest neighbours left, which are all joined by an elimination."""
+    near: dict[int, set[int]] = {row: set() for row in range(sparsity.size1())}
+    for row, column in zip(*sparsity.get_triplet(), strict=True):
+        if row != column:
+            near[row].add(column)
+            near[column].add(row)
+    order = []
+    while near:
+        chosen = min(near, key=lambda row: (len(near[row]), row))
+        joined = near.pop(chosen)
+        for row in joined:
+            near[row] |= joined
+            near[row] -= {row, chosen}
+        order.append(chosen)
+    return order
 
 
 def _factorised(W: ca.SX) -> tuple[ca.SX, ca.SX, list[ca.SX]]:

@@ -27,6 +27,17 @@ def inputs(plant: Plant, recording: Recording) -> tuple[np.ndarray, np.ndarray]:
     return np.reshape(u, (len(u), n)), np.reshape(d, (len(d), n))
 
 
+def received(plant: Plant, outputs: np.ndarray, sample_time_s: float) -> np.ndarray:
+    """Outputs as the computer gets them through the causes in time, shape (n_y, n)."""
+    rows = list(outputs)
+    for member in plant.members:
+        rows = [
+            member.resample(name, row, sample_time_s)
+            for name, row in zip(plant.measured, rows, strict=True)
+        ]
+    return np.reshape(rows, outputs.shape)
+
+
 def simulate(plant: Plant, recording: Recording, initial: np.ndarray | None = None) -> Recording:
     """The plant's states and outputs under recorded inputs, held between samples.
 
@@ -49,7 +60,7 @@ def simulate(plant: Plant, recording: Recording, initial: np.ndarray | None = No
             for first, last in zip(recording.starts, ends, strict=True)
         ]
     )
-    y = model.f.map(len(recording))(x, u, d, p)[1].full()
+    y = received(plant, model.f.map(len(recording))(x, u, d, p)[1].full(), dt)
     bad = ~np.isfinite(y).all(axis=0)
     if bad.any():
         raise ArithmeticError(

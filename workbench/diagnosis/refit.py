@@ -56,7 +56,7 @@ def refit(problem: Problem, profile: Profile) -> Refit:
     """Fit the candidate of a profile from its best sizes, and validate it."""
     candidate = profile.candidate
     windows = problem.base.windows
-    if not any(member.name == candidate.member for member in windows.plant.members):
+    if candidate.strength not in windows.plant.values:
         needed = [c.member for c in problem.added] + [candidate.member]
         windows = windows.with_plant(staged(problem.whole, *needed))
     unknowns = _with_shape(problem, problem.unknowns(windows.plant, candidate), profile)

@@ -203,4 +203,4 @@ def _profiles(
 
 def _needed(plant: Plant, candidate: Candidate) -> tuple[str, ...]:
     """The members a candidate needs that bring states the plant does not have."""
-    return () if any(m.name == candidate.member for m in plant.members) else (candidate.member,)
+    return () if candidate.strength in plant.values else (candidate.member,)

@@ -20,6 +20,7 @@ from workbench.comparison.regimes import regime_shares
 from workbench.diagnosis.result import Dependence, Where
 from workbench.filtering import FilterResult, filter_pass, recording_filter, smooth
 from workbench.fitting.problem import Problem
+from workbench.linkage import Joint, Link
 from workbench.parts import Body, Chamber
 from workbench.plant import Plant
 from workbench.plant_filter import PlantFilter
@@ -27,8 +28,17 @@ from workbench.recording import Recording
 
 GRID_S = 5e-3
 BINS = 15
-INTENSITIES = {"velocity_m_s": (1.0, 5.0), "pressure_pa": (1e5, 1e6)}  # of a rate, per sqrt(s)
-PROCESS = {"velocity_m_s": 0.3, "pressure_pa": 3e4, "mass_kg": 1e-6}  # what no model is without
+INTENSITIES = {  # of a rate, per sqrt(s)
+    "velocity_m_s": (1.0, 5.0),
+    "velocity_rad_s": (20.0, 100.0),
+    "pressure_pa": (1e5, 1e6),
+}
+PROCESS = {  # what no model is without
+    "velocity_m_s": 0.3,
+    "velocity_rad_s": 6.0,
+    "pressure_pa": 3e4,
+    "mass_kg": 1e-6,
+}
 
 
 @dataclass(frozen=True)
@@ -89,7 +99,7 @@ def locate(problem: Problem, recordings: Sequence[Recording]) -> Where | None:
 
 
 def _suspects(plant: Plant) -> list[Suspect]:
-    """One per body and chamber; pressures stand for the mass balance of their chamber.
+    """One per body, link and chamber; pressures stand for the mass balance of their chamber.
 
     dp/dt = kappa R T / V mdot, so a missing mass flow is V / (kappa R T) times the missing rate.
     """
@@ -99,7 +109,11 @@ def _suspects(plant: Plant) -> list[Suspect]:
             mass = float(part.mass_kg)
             state = f"{part.name}.velocity_m_s"
             found.append(Suspect(f"{part.name}.momentum", state, "force_n", mass))
-        if isinstance(part, Chamber) and any(isinstance(p, Body) for p in plant.parts):
+        if isinstance(part, Link):
+            state = f"{part.joint}.velocity_rad_s"
+            inertia = float(part.inertia_kg_m2)
+            found.append(Suspect(f"{part.joint}.momentum", state, "torque_n_m", inertia))
+        if isinstance(part, Chamber) and any(isinstance(p, Body | Joint) for p in plant.parts):
             volume = float(part.dead_volume_m3) + float(part.area_m2 * part.stroke_m) / 2
             factor = volume / (
                 HEAT_CAPACITY_RATIO * part.gas_constant_j_kg_k * part.initial_temperature_k

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import casadi as ca
 
@@ -39,6 +39,26 @@ def blend(deflection: Expression, velocity: Expression, limit: Expression) -> Ex
     return ca.if_else(velocity * deflection > 0, rising, 0.0)
 
 
+@dataclass(frozen=True)
+class ElastoPlastic:
+    """A bristle that bends back without loss before it slides (F5 of paper 002): no creep."""
+
+    def __call__(
+        self, deflection: Expression, velocity: Expression, limit: Expression
+    ) -> Expression:
+        return blend(deflection, velocity, limit)
+
+
+@dataclass(frozen=True)
+class LuGre:
+    """A bristle that slides a little at any speed: alpha = 1, which creeps under small loads."""
+
+    def __call__(
+        self, deflection: Expression, velocity: Expression, limit: Expression
+    ) -> Expression:
+        return 1.0
+
+
 @dataclass(frozen=True, kw_only=True)
 class BristleFriction(StribeckFriction):
     """Stribeck friction, of which ``presliding_share`` acts through an elastic bristle.
@@ -53,7 +73,7 @@ class BristleFriction(StribeckFriction):
     out with its forces.
 
     Source: paper 002 Eqs. 9 to 14 and Table 5 (F5; erratum E002-6: magnitudes for v < 0).  Law
-    selection by share: architecture.md section 4.
+    selection by share: architecture.md section 4.  ``plasticity`` is alpha: LuGre is F5 with 1.
     """
 
     causes = (
@@ -70,10 +90,19 @@ class BristleFriction(StribeckFriction):
         ),
     )
 
+    plasticity: ElastoPlastic | LuGre = ElastoPlastic()
+
     presliding_share: Expression = strength(typical=1.0, upper=1.0, relative_deviation=0.0)
 
     breakaway_deflection_m: Expression = form(40e-6, lower=1e-6, upper=1e-3)
     bristle_time_s: Expression = form(45e-6, lower=0.0, upper=1e-2)
+
+    def reduced(self) -> StribeckFriction:
+        """Without presliding there is no bristle."""
+        if not isinstance(self.presliding_share, int | float) or self.presliding_share != 0.0:
+            return self
+        kept = (f.name for f in fields(StribeckFriction))
+        return StribeckFriction(**{name: getattr(self, name) for name in kept})
 
     def states(self) -> Iterator[State]:
         yield State("deflection_m", initial=0.0, scale=2e-5, tolerance=1e-8)
@@ -97,5 +126,5 @@ class BristleFriction(StribeckFriction):
         static_n = self._static_force_n(now) + NEGLIGIBLE_FORCE_N
         relative = (self.dry_force_n(now) + NEGLIGIBLE_FORCE_N) / static_n
         limit_m = self.breakaway_deflection_m * ca.fmax(relative, LEAST_DEFLECTION)
-        plastic = blend(z, velocity_m_s, limit_m) * ca.fabs(velocity_m_s) * z / limit_m
+        plastic = self.plasticity(z, velocity_m_s, limit_m) * ca.fabs(velocity_m_s) * z / limit_m
         return velocity_m_s - plastic

@@ -1,4 +1,4 @@
-"""Forces on a body besides friction and pressure: constant, spring, cushion, end stops."""
+"""Forces on a body besides friction and chambers: constant, rod end, spring, cushion, end stops."""
 
 from __future__ import annotations
 
@@ -56,6 +56,20 @@ class Weight(Effect):
 
     def terms(self, now: Conditions) -> Iterator[Force]:
         yield Force(self.body, -now[self.body].moving_mass_kg * self.gravity_m_s2)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RodEnd(Effect):
+    """The atmosphere on the end of a rod that leaves the cylinder: F = -P_E A_rod.
+
+    Source: papers 000 and 001 (force balance); physics.md 2.1.
+    """
+
+    body: str
+    area_m2: Expression = form(5e-5, lower=0.0)
+
+    def terms(self, now: Conditions) -> Iterator[Force]:
+        yield Force(self.body, -self.area_m2 * now["atmosphere"].pressure_pa)
 
 
 @dataclass(frozen=True, kw_only=True)

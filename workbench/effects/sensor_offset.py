@@ -42,3 +42,16 @@ class PositionSensorOffset(Effect):
 
     def alter(self, signal: str, value: Expression, now: Conditions) -> Expression:
         return value + self.offset_m if signal == self.signal else value
+
+
+@dataclass(frozen=True, kw_only=True)
+class AngleSensorOffset(Effect):
+    """y = theta + e.  Source: physics.md section 6 (adc bias)."""
+
+    causes = (Cause(strength="offset_rad", **CAUSE),)
+
+    signal: str
+    offset_rad: Expression = strength(typical=0.05, lower=-0.5, upper=0.5)
+
+    def alter(self, signal: str, value: Expression, now: Conditions) -> Expression:
+        return value + self.offset_rad if signal == self.signal else value

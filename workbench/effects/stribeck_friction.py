@@ -24,11 +24,12 @@ class StribeckFriction(Effect):
     """Coulomb, Stribeck and viscous friction, which may vary with direction, place and pressure.
 
     F   = g tanh(k v) + s2 (v + e |v|)
-    g   = (1 + e_x cos(2 pi x / lambda + phi)) (F_C + F_ex exp(-(|v|/v_s)^2)) + c_p |dp|
+    g   = (1 + e_x cos(2 pi x / lambda + phi)) (F_C + F_ex exp(-(|v|/v_s)^i)) + c_p |dp|
 
     Each coefficient counts times 1 + w e for v >= 0 and 1 - w e below, with e ``asymmetry`` and w
-    its weight.  F_ex = F_S - F_C is the excess of static friction.  dp is the pressure between the
-    two ``chambers``, or of the one against ambient.
+    its weight.  F_ex = F_S - F_C is the excess of static friction; i is 2 in paper 002 and 5 in
+    paper 000, where the tanh keeps the peak below F_S (erratum E000-10).  dp is the pressure
+    between the two ``chambers``, or of the one against ambient.
 
     Source: paper 000 Eq. 11 (F3 of physics.md 1.3); asymmetry by paper 002 Table 5 (erratum
     E002-6: magnitudes for v < 0); place and pressure by physics.md section 6.  Deviations from
@@ -97,6 +98,7 @@ class StribeckFriction(Effect):
 
     body: str
     chambers: tuple[str, ...] = ()
+    stribeck_exponent: int = 2
 
     coulomb_force_n: Expression = strength(typical=60.0, upper=1e3)
     stiction_excess_n: Expression = strength(typical=60.0, upper=1e3)
@@ -121,7 +123,8 @@ class StribeckFriction(Effect):
         """g: the dry force of steady sliding, positive."""
         velocity_m_s = now[self.body].velocity_m_s
         side = ca.if_else(velocity_m_s >= 0, self.asymmetry, -self.asymmetry)
-        peak = ca.exp(-ca.fmin((velocity_m_s / self.stribeck_velocity_m_s) ** 2, 50.0))
+        relative = ca.fabs(velocity_m_s) / self.stribeck_velocity_m_s
+        peak = ca.exp(-ca.fmin(relative**self.stribeck_exponent, 50.0))
         excess_n = self.stiction_excess_n * (1.0 + self.excess_weight * side) * peak
         plain_n = self.coulomb_force_n * (1.0 + self.coulomb_weight * side) + excess_n
         return self._along(now) * plain_n + self._pressed_n(now)

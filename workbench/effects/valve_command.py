@@ -19,6 +19,7 @@ from workbench.effect import (
     form,
     strength,
 )
+from workbench.effects.timing import Timing
 
 FADING_V = 0.01  # half-width of a band below which its centre loses its meaning
 
@@ -162,11 +163,8 @@ class DeadZone(Effect):
 
 
 @dataclass(frozen=True, kw_only=True)
-class CommandDelay(Effect):
-    """A pure delay of a command, u(t - T), applied to the sampled sequence.
-
-    Between samples the command is interpolated linearly, so any T >= 0 is possible; at T = 0 the
-    sequence is unchanged.
+class CommandDelay(Timing):
+    """A pure delay of a command, u(t - T); at T = 0 the sequence is unchanged.
 
     Source: papers 000 and 001 (1 ms each way), 003 (3 ms); physics.md section 6 (valve_delay).
     """
@@ -187,8 +185,8 @@ class CommandDelay(Effect):
     signal: str
     delay_s: Expression = strength(typical=15e-3, upper=0.2)
 
-    def resample(self, channel: str, values: np.ndarray, sample_time_s: float) -> np.ndarray:
-        if channel != self.signal or self.delay_s == 0.0:
-            return values
-        samples = np.arange(len(values), dtype=float)
-        return np.interp(samples - float(self.delay_s) / sample_time_s, samples, values)
+    def acts_on(self, channel: str) -> bool:
+        return channel == self.signal
+
+    def sent_at_s(self, time_s: np.ndarray) -> np.ndarray:
+        return time_s - float(self.delay_s)

@@ -5,11 +5,14 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
+from workbench.effects.timing import sent_at_s
 from workbench.fitting.starts import guessed_states
 from workbench.model import Model
 from workbench.plant import Plant
 from workbench.recording import Recording
 from workbench.simulation import inputs
+
+FURTHEST_BACK = 3.0  # samples before its start to which a window is extrapolated
 
 
 def window_run(plant: Plant, sample_time_s: float, length: int) -> ca.Function:
@@ -90,6 +93,30 @@ def cut_inputs(
     )
     u, d = (rows.reshape(rows.shape[0], rows.shape[1] * length) for rows in cut)
     return u, d
+
+
+def received_windows(
+    plant: Plant, outputs: np.ndarray, firsts: tuple[tuple[int, ...], ...], sample_time_s: float
+) -> np.ndarray:
+    """Outputs (n_y, n_windows, L) as the computer gets them through the causes in time.
+
+    What was sent shortly before a window is extrapolated from its first two samples.
+    """
+    length = outputs.shape[2]
+    begin_s = (
+        sample_time_s * np.concatenate([np.array(own, dtype=float) for own in firsts])[:, None]
+    )
+    time_s = begin_s + sample_time_s * np.arange(length)
+    found = outputs.copy()
+    for row, name in enumerate(plant.measured):
+        sent_s = sent_at_s(plant.members, name, time_s)
+        if sent_s is time_s:
+            continue
+        place = np.maximum((sent_s - begin_s) / sample_time_s, -FURTHEST_BACK)
+        older = np.clip(np.floor(place + 1e-9), 0, length - 2).astype(int)
+        before, after = (np.take_along_axis(outputs[row], older + k, axis=1) for k in (0, 1))
+        found[row] = before + (place - older) * (after - before)
+    return found
 
 
 def window_starts(

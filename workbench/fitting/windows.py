@@ -22,6 +22,7 @@ from workbench.fitting.error_model import OUTLYING, ErrorModel, error_model
 from workbench.fitting.window_cuts import (
     cut_inputs,
     cut_rows,
+    received_windows,
     thinned,
     window_firsts,
     window_run,
@@ -159,7 +160,13 @@ class Windows:
         x0 = np.hstack(list(starts)) if starts.shape[1] else np.zeros((0, p.shape[1]))
         y = self._run.map(p.shape[1], "thread", THREADS)(x0, u, d, p).full()
         n_y, n = len(self.plant.measured), len(self)
-        return y.reshape(n_y, len(plants), n, self.length).transpose(1, 0, 2, 3)
+        sent = y.reshape(n_y, len(plants), n, self.length).transpose(1, 0, 2, 3)
+        dt = self.recordings[0].sample_time_s
+        found = [
+            received_windows(plant, one, self.firsts, dt)
+            for plant, one in zip(plants, sent, strict=True)
+        ]
+        return np.array(found)
 
     def residuals(self, plants: Iterable[Plant], starts: np.ndarray) -> np.ndarray:
         """Weighted residuals, measured minus simulated, shape (n_plants, n_y, n_windows, L)."""

@@ -1,5 +1,8 @@
 """The plants of the papers.  A new plant is one file here and one line below."""
 
+from workbench.plants.crr_arm import crr_arm
+from workbench.plants.crr_leg import crr_leg
+from workbench.plants.crr_rig import crr_rig
 from workbench.plants.cylinder_bench import cylinder_bench
 from workbench.plants.servo_drive import servo_drive
 from workbench.plants.vertical_cylinder import vertical_cylinder
@@ -8,4 +11,7 @@ PLANTS = {
     "servo_drive": servo_drive,
     "vertical_cylinder": vertical_cylinder,
     "cylinder_bench": cylinder_bench,
+    "crr_rig": crr_rig,
+    "crr_arm": crr_arm,
+    "crr_leg": crr_leg,
 }
