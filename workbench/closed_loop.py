@@ -14,7 +14,7 @@ from time import perf_counter
 import numpy as np
 
 from workbench.contracts import Controller, Estimator
-from workbench.plant import Plant
+from workbench.plant import Plant, Signal
 from workbench.recording import Recording
 
 MEMORY = 512  # past samples that a delay may reach back
@@ -48,11 +48,19 @@ class Hardware:
         return seen
 
     def sent(self, plant: Plant, command: np.ndarray) -> np.ndarray:
-        """What the valve gets of a command: within its range, on the converter's grid."""
-        lower = np.array([signal.lower for signal in plant.commands])
-        upper = np.array([signal.upper for signal in plant.commands])
-        step = (upper - lower) / (2**self.converter_bits - 1)
-        return lower + np.round((np.clip(command, lower, upper) - lower) / step) * step
+        """What the valves get of a command: within its range, on the converter's grid.
+
+        A switched command takes the nearest of its levels.
+        """
+        pairs = zip(plant.commands, command, strict=True)
+        return np.array([self._converted(signal, float(value)) for signal, value in pairs])
+
+    def _converted(self, signal: Signal, value: float) -> float:
+        if signal.levels:
+            return min(signal.levels, key=lambda level: abs(level - value))
+        step = (signal.upper - signal.lower) / (2**self.converter_bits - 1)
+        limited = np.clip(value, signal.lower, signal.upper)
+        return signal.lower + np.round((limited - signal.lower) / step) * step
 
 
 @dataclass(frozen=True)
@@ -168,13 +176,13 @@ class _Plant:
 
     def __call__(self, x: np.ndarray, command: np.ndarray, k: int) -> np.ndarray:
         self.sent[k + MEMORY] = command
+        past = [*self.sent[k + 1 : k + MEMORY + 1].T]
         for member in self.late:
-            past = self.sent[k + 1 : k + MEMORY + 1]
-            late = [
-                member.resample(name, column, self.sample_time_s)[-1]
-                for name, column in zip(self.commands, past.T, strict=True)
+            past = [
+                member.resample(name, column, self.sample_time_s)
+                for name, column in zip(self.commands, past, strict=True)
             ]
-            command = np.array(late)
+        command = np.array([column[-1] for column in past])
         x = self.step(x, command, self.d, self.p).full().ravel()
         if not np.isfinite(x).all():
             at_s = (k + 1) * self.sample_time_s

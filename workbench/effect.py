@@ -66,6 +66,10 @@ class Force(Term):
     """A force on a body in N, positive towards growing position."""
 
 
+class Torque(Term):
+    """A torque on a lever in N m, positive towards growing angle."""
+
+
 class HeatFlow(Term):
     """Heat entering the gas of a chamber, in W."""
 

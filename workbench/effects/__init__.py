@@ -1,33 +1,44 @@
 """The catalogue of effects.  A new effect is one file here and one line below."""
 
 from workbench.effects.bristle_friction import BristleFriction
+from workbench.effects.detent import Detent
 from workbench.effects.five_port_valve import FivePortValve
 from workbench.effects.forces import ConstantForce, EndCushion, EndStops, SpringForce, Weight
 from workbench.effects.leaks import ChamberLeak, PistonLeak
+from workbench.effects.lever_link import LeverLink
+from workbench.effects.piston_contact import PistonContact
 from workbench.effects.sensor_offset import (
     PositionSensorOffset,
     PressureSensorOffset,
 )
+from workbench.effects.solenoid_valve import SolenoidValve
 from workbench.effects.stribeck_friction import StribeckFriction
 from workbench.effects.supply_droop import SupplyDroop
+from workbench.effects.synchroniser import Synchroniser
 from workbench.effects.valve_command import CommandDelay, DeadZone, ValveLag, ValveOffset
-from workbench.effects.wall_heat import WallHeat
+from workbench.effects.wall_heat import ConstantWallHeat, WallHeat
 
 CATALOGUE = (
     BristleFriction,
     ChamberLeak,
     CommandDelay,
     ConstantForce,
+    ConstantWallHeat,
     DeadZone,
+    Detent,
     EndCushion,
     EndStops,
     FivePortValve,
+    LeverLink,
+    PistonContact,
     PistonLeak,
     PositionSensorOffset,
     PressureSensorOffset,
+    SolenoidValve,
     SpringForce,
     StribeckFriction,
     SupplyDroop,
+    Synchroniser,
     ValveLag,
     ValveOffset,
     WallHeat,

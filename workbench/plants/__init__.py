@@ -1,11 +1,13 @@
 """The plants of the papers.  A new plant is one file here and one line below."""
 
 from workbench.plants.cylinder_bench import cylinder_bench
+from workbench.plants.gearbox import gearbox
 from workbench.plants.servo_drive import servo_drive
 from workbench.plants.vertical_cylinder import vertical_cylinder
 
 PLANTS = {
     "servo_drive": servo_drive,
+    "gearbox": gearbox,
     "vertical_cylinder": vertical_cylinder,
     "cylinder_bench": cylinder_bench,
 }
