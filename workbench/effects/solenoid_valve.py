@@ -126,7 +126,7 @@ class SolenoidValve(Effect):
         seated_m = -self.preload_n / (self.stop_stiffness_n_m + self.spring_stiffness_n_m)
         yield State("current_a", initial=0.0, scale=0.5, tolerance=1e-3)
         yield State("armature_position_m", initial=seated_m, scale=1e-3, tolerance=1e-7)
-        yield State("armature_velocity_m_s", initial=0.0, scale=1.0, tolerance=1e-2)
+        yield State("armature_velocity_m_s", initial=0.0, scale=1.0, tolerance=1e-3)
 
     def terms(self, now: Conditions) -> Iterator[MassFlow]:
         gas, lift_m = now[self.chamber], self._lift_m(now)
