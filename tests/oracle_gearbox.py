@@ -57,7 +57,8 @@ def valve(i, x, v, c):
     inductance = N**2 / reluctance
     slope = N**2 / (reluctance**2 * MU_0 * A_P)
     voltage = U if c == 1 else -U_Z * min(max(i / LETTING_GO, -1.0), 1.0)
-    i_dot = (voltage - R_COIL * i - i * slope * v) / inductance
+    lifting = v if 0.0 <= x <= X_MAX else 0.0  # the clipped position stands still in the stops
+    i_dot = (voltage - R_COIL * i - i * slope * lifting) / inductance
     walls = push(-x, -v, STOP, STOP_DAMPING) - push(x - X_MAX, v, STOP, STOP_DAMPING)
     force = 0.5 * i**2 * slope - F_0 - K_S * x - D_V * v + walls
     inlet = C_D * min(np.pi * D_IN * lift, np.pi * D_IN**2 / 4)

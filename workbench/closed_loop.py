@@ -176,13 +176,13 @@ class _Plant:
 
     def __call__(self, x: np.ndarray, command: np.ndarray, k: int) -> np.ndarray:
         self.sent[k + MEMORY] = command
-        past = [*self.sent[k + 1 : k + MEMORY + 1].T]
         for member in self.late:
-            past = [
-                member.resample(name, column, self.sample_time_s)
-                for name, column in zip(self.commands, past, strict=True)
+            past = self.sent[k + 1 : k + MEMORY + 1]
+            late = [
+                member.resample(name, column, self.sample_time_s)[-1]
+                for name, column in zip(self.commands, past.T, strict=True)
             ]
-        command = np.array([column[-1] for column in past])
+            command = np.array(late)
         x = self.step(x, command, self.d, self.p).full().ravel()
         if not np.isfinite(x).all():
             at_s = (k + 1) * self.sample_time_s

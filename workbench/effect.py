@@ -67,7 +67,7 @@ class Force(Term):
 
 
 class Torque(Term):
-    """A torque on a lever in N m, positive towards growing angle."""
+    """A torque on a joint in N m, positive towards growing angle."""
 
 
 class HeatFlow(Term):

@@ -244,7 +244,7 @@ class Chamber(Part):
             "temperature_k": ca.fmax(pressure_pa * volume_m3 / content_j_k, LOWEST_TEMPERATURE_K),
             "length_m": length_m,
             "area_m2": self.area_m2,
-            "wall_area_m2": 2.0 * self.area_m2 + pi * diameter_m * ca.fmax(length_m, 0.0),
+            "surface_m2": 2.0 * self.area_m2 + pi * diameter_m * ca.fmax(length_m, 0.0),
             "gas_constant_j_kg_k": self.gas_constant_j_kg_k,
         }
 

@@ -33,8 +33,8 @@ import numpy as np
 
 GAMMA = 0.5
 COARSEST_STEP_S = 1e-3
-FINER = 3
-LEVELS = 7  # the finest steps are 1/729 of the coarse one: a contact met at speed needs them
+FINER = 4
+LEVELS = 6  # the finest steps are 1/1024 of the coarse one: a contact met at speed needs them
 
 
 def controlled_step(

@@ -55,7 +55,7 @@ class SharedChamber(Chamber):
         derived = super().derive(now)
         first_m3_s = derived["volume_rate_m3_s"]
         wall_m2 = 2.0 * self.second_area_m2
-        return derived | {"volume_rate_m3_s": first_m3_s + second_m3_s, "wall_area_m2": wall_m2}
+        return derived | {"volume_rate_m3_s": first_m3_s + second_m3_s, "surface_m2": wall_m2}
 
     def terms(self, now: Conditions) -> Iterator[Term]:
         pressure_pa = self.acting_pressure_pa(now)

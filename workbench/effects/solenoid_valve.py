@@ -43,7 +43,8 @@ class SolenoidValve(Effect):
 
     R_c = R_20 (1 + 0.0039 / K (T - 20 degC)).  A command between 0 and 1 mixes the two voltages,
     as fast switching would.  The armature is kept between its stops before it enters the magnetic
-    circuit and the seats, since a bounce beyond would make the gap negative (physics.md 8.2).
+    circuit and the seats, since a bounce beyond would make the gap negative (physics.md 8.2); so
+    the inductance stands still while the armature is in a stop, and induces nothing there.
 
     The force of the pressures on the armature is absent by assumption 7 of the paper
     (``seat_area_m2``).  Assumptions 5 and 6: the working port does not restrict; the stroke is
@@ -124,9 +125,9 @@ class SolenoidValve(Effect):
 
     def states(self) -> Iterator[State]:
         seated_m = -self.preload_n / (self.stop_stiffness_n_m + self.spring_stiffness_n_m)
-        yield State("current_a", initial=0.0, scale=0.5, tolerance=1e-3)
-        yield State("armature_position_m", initial=seated_m, scale=1e-3, tolerance=1e-7)
-        yield State("armature_velocity_m_s", initial=0.0, scale=1.0, tolerance=1e-3)
+        yield State("current_a", initial=0.0, scale=0.5, tolerance=3e-4)
+        yield State("armature_position_m", initial=seated_m, scale=1e-3, tolerance=1e-6)
+        yield State("armature_velocity_m_s", initial=0.0, scale=1.0, tolerance=2.5e-4)
 
     def terms(self, now: Conditions) -> Iterator[MassFlow]:
         gas, lift_m = now[self.chamber], self._lift_m(now)
@@ -148,7 +149,9 @@ class SolenoidValve(Effect):
 
     def rates(self, now: Conditions, received: Received) -> dict[str, Expression]:
         own, lift_m = now[self.name], self._lift_m(now)
-        current_a, velocity_m_s = own.current_a, own.armature_velocity_m_s
+        current_a, place_m = own.current_a, own.armature_position_m
+        between = ca.logic_and(place_m >= 0, place_m <= self.full_lift_m)
+        moving_m_s = ca.if_else(between, own.armature_velocity_m_s, 0.0)
         gap_m = self.residual_gap_m + self.full_lift_m - lift_m
         pole_h_m = VACUUM_PERMEABILITY_H_M * self.pole_area_m2
         reluctance_per_h = self.core_reluctance_per_h + gap_m / pole_h_m
@@ -157,11 +160,11 @@ class SolenoidValve(Effect):
         warm = 1.0 + COPPER_PER_K * (self.coil_temperature_k - COIL_REFERENCE_K)
         across_v = self._voltage_v(own.command, current_a)
         across_v -= self.coil_resistance_ohm * warm * current_a
-        across_v -= current_a * slope_h_m * velocity_m_s
+        across_v -= current_a * slope_h_m * moving_m_s
         force_n = 0.5 * current_a**2 * slope_h_m + self._mechanical_n(now)
         return {
             "current_a": across_v / inductance_h,
-            "armature_position_m": velocity_m_s,
+            "armature_position_m": own.armature_velocity_m_s,
             "armature_velocity_m_s": force_n / self.armature_mass_kg,
         }
 

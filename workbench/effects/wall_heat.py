@@ -52,7 +52,7 @@ class ConstantWallHeat(Effect):
         wall_k = now[self.wall].temperature_k
         for chamber in self.chambers:
             gas = now[chamber]
-            conductance_w_k = self.coefficient_w_m2_k * gas.wall_area_m2 * self.relative(gas)
+            conductance_w_k = self.coefficient_w_m2_k * gas.surface_m2 * self.relative(gas)
             yield HeatFlow(chamber, conductance_w_k * (wall_k - gas.temperature_k))
 
     def relative(self, gas: SimpleNamespace) -> Expression:
