@@ -3,22 +3,33 @@
 import numpy as np
 from scipy.integrate import Radau
 
-ABSOLUTE = {"m": 1e-9, "m_s": 1e-7, "pa": 0.1, "kg": 1e-11}
+from workbench.units import suffix
+
+ABSOLUTE = {
+    "m": 1e-9,
+    "m_s": 1e-7,
+    "pa": 0.1,
+    "kg": 1e-11,
+    "rad": 2e-8,
+    "rad_s": 2e-6,
+    "a": 1e-7,
+}
 BRISTLE_M = 1e-11
 
 
 def reference(plant, command, sample_time_s, contact=False):
-    """States at every sample, shape (n_x, n), for one command sequence held between samples.
+    """States at every sample, shape (n_x, n), for commands held between samples, (n,) or (n_u, n).
 
     rtol 1e-9, steps of at most 2 ms, and of 0.1 ms with ten times finer tolerances in ``contact``.
     """
     model, p = plant.model, plant.nominal[2]
     finer, longest_s = (0.1, 1e-4) if contact else (1.0, 2e-3)
     options = dict(rtol=1e-9, atol=finer * _tolerances(model), max_step=longest_s, first_step=1e-6)
-    states = np.empty((len(model.states), len(command)))
+    command = np.atleast_2d(command)
+    states = np.empty((len(model.states), command.shape[1]))
     states[:, 0] = x = plant.initial
     for first, last in _constant_pieces(command):
-        u = command[first]
+        u = command[:, first]
         solver = Radau(
             lambda t, x, u=u: model.f(x, u, [], p)[0].full().ravel(),
             first * sample_time_s,
@@ -46,13 +57,14 @@ def _run(solver, states, first, last, sample_time_s):
 
 
 def _tolerances(model):
-    units = (name.rpartition(".")[2].partition("_")[2] for name in model.states)
-    values = [ABSOLUTE[unit] for unit in units]
-    values[model.states.index("friction.deflection_m")] = BRISTLE_M
-    return np.array(values)
+    bristle = "deflection_m"
+    return np.array(
+        [BRISTLE_M if n.endswith(bristle) else ABSOLUTE[suffix(n)] for n in model.states]
+    )
 
 
 def _constant_pieces(command):
     """First and last sample of each stretch over which the command is held."""
-    ends = [*(np.flatnonzero(np.diff(command[:-1])) + 1), len(command) - 1]
+    changes = np.diff(command[:, :-1]).any(axis=0)
+    ends = [*(np.flatnonzero(changes) + 1), command.shape[1] - 1]
     return zip([0, *ends[:-1]], ends, strict=True)

@@ -27,7 +27,7 @@ class Lever(Part):
     initial_angle_rad: float = 0.0
 
     def states(self) -> Iterator[State]:
-        yield State("angle_rad", self.initial_angle_rad, scale=0.2, tolerance=1e-6)
+        yield State("angle_rad", self.initial_angle_rad, scale=0.2, tolerance=2e-6)
         yield State("velocity_rad_s", initial=0.0, scale=20.0, tolerance=0.04)
 
     def guess(self, seen: Mapping[str, np.ndarray]) -> dict[str, tuple[np.ndarray | float, float]]:

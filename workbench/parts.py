@@ -68,9 +68,11 @@ class Atmosphere(Part):
 
 @dataclass(frozen=True, kw_only=True)
 class Body(Part):
-    """A body moving along one line; ``travel_m`` is a typical distance, for the solvers.
+    """A body moving along one line.
 
     (m + dm + sum of added masses) dv/dt = sum of forces
+
+    For the solvers: ``travel_m`` is a typical distance, ``step_error_m`` what one step may err.
 
     Source: paper 002 Eq. 9 and the like in 000, 001, 003.
     """
@@ -93,9 +95,10 @@ class Body(Part):
 
     initial_position_m: float = 0.0
     travel_m: float = 0.1
+    step_error_m: float = 2e-8
 
     def states(self) -> Iterator[State]:
-        yield State("position_m", self.initial_position_m, self.travel_m, tolerance=2e-8)
+        yield State("position_m", self.initial_position_m, self.travel_m, self.step_error_m)
         yield State("velocity_m_s", initial=0.0, scale=1.0, tolerance=2e-3)
 
     def guess(self, seen: Mapping[str, np.ndarray]) -> dict[str, tuple[np.ndarray | float, float]]:

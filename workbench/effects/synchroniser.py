@@ -32,8 +32,8 @@ class Synchroniser(Effect):
     dz/dt = -g min(z / 0.02, 1) / T_sync + (1 - z) max(1 - |x_tip| / x_1, 0) / T_slip
 
     g is 1 between x_1 and x_2 with edges of 0.2 mm and 0 outside; z is the relative speed over its
-    value when the gear is out, so that it falls to zero in T_sync within the zone and comes back
-    in Neutral.  Where the load force is recorded, the synchroniser is in the record.
+    value when the gear is out: it falls to zero in T_sync at the full force, later at less, and
+    comes back in Neutral.  Where the load force is recorded, the synchroniser is in the record.
 
     Source: physics.md section 6 (synchroniser); future work in paper 003.  The zone, its edges and
     the return of the slip are *chosen*.  A force only delays a piston that pushes harder: at 9 bar

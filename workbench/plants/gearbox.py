@@ -58,6 +58,7 @@ PISTON_M2 = pi / 4 * 50e-3**2  # A1
 SHANK_M2 = pi / 4 * 30e-3**2  # A2
 RING_M2 = pi / 4 * (65e-3**2 - 30e-3**2)  # A_F
 FINGER_M = 50e-3
+STEP_ERROR_M = 6e-8  # a sensor with 20 um of noise sees nothing of it
 STEEPNESS_S_M = 2000.0 / 2  # tanh(f v / 2) of paper 003 Eq. 10
 STOPS = dict(stiffness_n_m=2e7, damping_n_s_m=4e3)
 
@@ -100,8 +101,9 @@ def _parts(start_m: float) -> tuple[Part, ...]:
     )
     whole = dict(stroke_m=2 * STROKE_M, lower_m=-STROKE_M)
     below = dict(stroke_m=STROKE_M, lower_m=-STROKE_M)
-    main = dict(mass_kg=1.0, initial_position_m=start_m)
-    floating = dict(mass_kg=0.35, initial_position_m=floating_m)
+    solved = dict(travel_m=STROKE_M, step_error_m=STEP_ERROR_M)
+    main = dict(mass_kg=1.0, initial_position_m=start_m, **solved)
+    floating = dict(mass_kg=0.35, initial_position_m=floating_m, **solved)
     finger = dict(inertia_kg_m2=1.5e-3, arm_m=FINGER_M, initial_angle_rad=start_m / FINGER_M)
     first = dict(area_m2=PISTON_M2, dead_volume_m3=15e-6, **whole)
     second = dict(area_m2=SHANK_M2, dead_volume_m3=40e-6, second_side=-1, **whole)
@@ -109,8 +111,8 @@ def _parts(start_m: float) -> tuple[Part, ...]:
     return (
         Supply(name="supply", pressure_pa=SUPPLY_PA, temperature_k=ROOM_K),
         Atmosphere(name="atmosphere", pressure_pa=ATMOSPHERE_PA, temperature_k=ROOM_K),
-        Body(name=MAIN, travel_m=STROKE_M, **main),
-        Body(name=FLOATING, travel_m=STROKE_M, **floating),
+        Body(name=MAIN, **main),
+        Body(name=FLOATING, **floating),
         Lever(name=FINGER, tip_body=MAIN, **finger),
         LeverLoad(name="load", lever=FINGER, arm_m=60e-3),
         Chamber(name="chamber_1", side=+1, **first, **gas),
