@@ -201,3 +201,21 @@ def test_with_the_control_chamber_left_out_the_pistons_feel_the_atmosphere():
     bare, seen = shifted("N to H", 0.06), shifted("N to H", 0.06, control_chamber__acting_share=0.0)
 
     assert 1e3 * np.abs(seen[POSITION] - bare[POSITION]).max() == pytest.approx(0.1, abs=0.05)
+
+
+def test_states_that_nobody_records_are_guessed_where_they_can_be():
+    """The floating piston ahead of the main one, gas that fits its volume, a valve as commanded."""
+    plant = gearbox().lean()
+    seen = run(plant, [((1, 0), 0.1)])
+    recorded = {name: seen[name] for name in (*plant.measured, *plant.model.commands)}
+    known = recorded | {VELOCITY: seen[VELOCITY]}
+    for member in plant.members:
+        for quantity, (value, _) in member.guess(known).items():
+            known[f"{member.name}.{quantity}"] = np.broadcast_to(value, len(seen))
+    last = {name: float(known[name][-1]) for name in plant.model.states if name in known}
+    sizes = {"floating_piston.position_m": 1e-4, LIFT: 1.2e-3, "valve_1.current_a": 0.1}
+    sizes |= {"finger.angle_rad": 1e-3, "control_chamber.mass_kg": 1e-6, PC: 1e3}
+    sizes |= {"chamber_1.mass_kg": 2e-4, "chamber_2.mass_kg": 1e-5}  # chamber 1 is still warm
+
+    for name, size in sizes.items():
+        assert last[name] == pytest.approx(seen[name][-1], abs=size), name

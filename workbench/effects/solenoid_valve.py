@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from math import pi
 
 import casadi as ca
+import numpy as np
 
 from workbench.air import GAS_CONSTANT_J_KG_K, NozzleLaw, Path, path_between
 from workbench.effect import (
@@ -128,6 +129,17 @@ class SolenoidValve(Effect):
         yield State("current_a", initial=0.0, scale=0.5, tolerance=3e-4)
         yield State("armature_position_m", initial=seated_m, scale=1e-3, tolerance=1e-6)
         yield State("armature_velocity_m_s", initial=0.0, scale=1.0, tolerance=2.5e-4)
+
+    def guess(self, seen: Mapping[str, np.ndarray]) -> dict[str, tuple[np.ndarray | float, float]]:
+        """As after a long time under the recorded command."""
+        command = seen.get(f"{self.name}.command")
+        if command is None:
+            return {}
+        steady_a = self.supply_voltage_v / self.coil_resistance_ohm
+        return {
+            "current_a": (command * steady_a, 0.3),
+            "armature_position_m": (command * self.full_lift_m, 0.5e-3),
+        }
 
     def terms(self, now: Conditions) -> Iterator[MassFlow]:
         gas, lift_m = now[self.chamber], self._lift_m(now)

@@ -45,10 +45,10 @@ from workbench.effects import (
     SupplyDroop,
     Synchroniser,
 )
+from workbench.floating_piston import ControlChamber, FloatingPiston, SharedChamber
 from workbench.lever import Lever, LeverLoad
 from workbench.parts import Atmosphere, Body, Chamber, Part, Supply
 from workbench.plant import Plant, Signal
-from workbench.shared_chamber import ControlChamber, SharedChamber
 
 SUPPLY_PA = 9.0e5
 ATMOSPHERE_PA = 1.013e5
@@ -112,7 +112,7 @@ def _parts(start_m: float) -> tuple[Part, ...]:
         Supply(name="supply", pressure_pa=SUPPLY_PA, temperature_k=ROOM_K),
         Atmosphere(name="atmosphere", pressure_pa=ATMOSPHERE_PA, temperature_k=ROOM_K),
         Body(name=MAIN, **main),
-        Body(name=FLOATING, **floating),
+        FloatingPiston(name=FLOATING, pushed_by=MAIN, **floating),
         Lever(name=FINGER, tip_body=MAIN, **finger),
         LeverLoad(name="load", lever=FINGER, arm_m=60e-3),
         Chamber(name="chamber_1", side=+1, **first, **gas),

@@ -1,9 +1,11 @@
-"""A chamber between two bodies that move independently."""
+"""A piston that another one pushes ahead of it, and the chambers that both of them close."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+
+import numpy as np
 
 from workbench.air import NozzleLaw, path_between
 from workbench.effect import (
@@ -17,7 +19,29 @@ from workbench.effect import (
     form,
     strength,
 )
-from workbench.parts import Chamber
+from workbench.parts import Body, Chamber
+
+
+@dataclass(frozen=True, kw_only=True)
+class FloatingPiston(Body):
+    """A body that rests at zero until another one pushes it ahead: nobody records where it is.
+
+    Source: paper 003 (floating piston).
+    """
+
+    pushed_by: str
+
+    def guess(self, seen: Mapping[str, np.ndarray]) -> dict[str, tuple[np.ndarray | float, float]]:
+        if f"{self.name}.position_m" in seen:
+            return super().guess(seen)
+        position_m = seen.get(f"{self.pushed_by}.position_m")
+        if position_m is None:
+            return {}
+        velocity_m_s = np.where(position_m > 0.0, seen[f"{self.pushed_by}.velocity_m_s"], 0.0)
+        return {
+            "position_m": (np.maximum(position_m, 0.0), 1e-4),
+            "velocity_m_s": (velocity_m_s, 0.1),
+        }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,6 +121,14 @@ class ControlChamber(SharedChamber):
 
     acting_share: Expression = strength(typical=1.0, upper=1.0, relative_deviation=0.0)
     port_area_m2: Expression = form(12e-6, lower=1e-8, upper=1e-3, relative_deviation=0.05)
+
+    def guess(self, seen: Mapping[str, np.ndarray]) -> dict[str, tuple[np.ndarray | float, float]]:
+        """Near the atmosphere where it is not recorded."""
+        name, place_m = f"{self.name}.pressure_pa", seen.get(f"{self.body}.position_m")
+        if name in seen or place_m is None:
+            return super().guess(seen)
+        near = super().guess({**seen, name: np.full_like(place_m, self.initial_pressure_pa)})
+        return near | {"pressure_pa": (self.initial_pressure_pa, 1e4)} if near else {}
 
     def acting_pressure_pa(self, now: Conditions) -> Expression:
         outside_pa = now["atmosphere"].pressure_pa
