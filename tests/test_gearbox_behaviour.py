@@ -219,3 +219,18 @@ def test_states_that_nobody_records_are_guessed_where_they_can_be():
 
     for name, size in sizes.items():
         assert last[name] == pytest.approx(seen[name][-1], abs=size), name
+
+
+def test_a_warm_seal_rubs_less_in_both_directions():
+    """10 K warmer at 1 N/K: 10 N less friction; without softening warmth changes nothing."""
+    plant = gearbox().with_values({"friction_thermal.softening_n_k": 1.0}).lean()
+    rate = plant.model.states.index(VELOCITY)
+    x, p = plant.initial, plant.nominal[2]
+    for velocity_m_s in (0.5, -0.5):
+        x[rate] = velocity_m_s
+        accelerations = []
+        for warmer_k in (0.0, 10.0):
+            x[plant.model.states.index("friction_thermal.warmer_k")] = warmer_k
+            accelerations.append(float(plant.model.f(x, [0, 0], [], p)[0][rate]))
+
+        assert np.sign(velocity_m_s) * np.diff(accelerations) == pytest.approx(10.0)

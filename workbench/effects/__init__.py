@@ -4,6 +4,7 @@ from workbench.effects.bristle_friction import BristleFriction
 from workbench.effects.detent import Detent
 from workbench.effects.five_port_valve import FivePortValve
 from workbench.effects.forces import ConstantForce, EndCushion, EndStops, SpringForce, Weight
+from workbench.effects.friction_thermal import ThermalFriction
 from workbench.effects.leaks import ChamberLeak, PistonLeak
 from workbench.effects.lever_link import LeverLink
 from workbench.effects.piston_contact import PistonContact
@@ -39,6 +40,7 @@ CATALOGUE = (
     StribeckFriction,
     SupplyDroop,
     Synchroniser,
+    ThermalFriction,
     ValveLag,
     ValveOffset,
     WallHeat,

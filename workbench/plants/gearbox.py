@@ -44,6 +44,7 @@ from workbench.effects import (
     StribeckFriction,
     SupplyDroop,
     Synchroniser,
+    ThermalFriction,
 )
 from workbench.floating_piston import ControlChamber, FloatingPiston, SharedChamber
 from workbench.lever import Lever, LeverLoad
@@ -144,6 +145,7 @@ def _mechanics() -> tuple:
             name=f"friction@{FLOATING}", coulomb_force_n=30.0, viscous_n_s_m=40.0, **ring
         ),
         StribeckFriction(name="friction@shank", coulomb_force_n=10.0, **shank),
+        ThermalFriction(name="friction_thermal", body=MAIN, rubbing_force_n=45.0, **dry),
         LeverLink(name="finger_joint", body=MAIN, lever=FINGER),
         Detent(name="detent", lever=FINGER, force_n=300.0, arm_m=50e-3, pitch_m=STROKE_M),
         Synchroniser(name="synchroniser", lever=FINGER),
