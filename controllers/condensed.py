@@ -4,23 +4,28 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import solve_discrete_are
 
+from controllers.margins import Law
 from controllers.positioning import STATES, PositioningSpec
+from controllers.spec import ranged
 from linearize.discrete import sampled
 from linearize.modes import Mode
-from linearize.standard import PRESSURES, VELOCITY
+from linearize.standard import PRESSURES, SUPPLY, VELOCITY, stroke_m
+from workbench.plant import Plant
 
 if TYPE_CHECKING:
     import osqp
 
 LIMITED = (0, 2, 3)  # position and pressures, of STATES
 SLACK_UNIT = np.array([1e-3, 1e4, 1e4])  # m, Pa, Pa: violations that cost alike
+LONGEST = 500  # samples ahead; the program is dense, and grows with the square
 SETTINGS = {
+    "rho": 0.1,
     "eps_abs": 1e-5,
     "eps_rel": 1e-5,
     "polishing": True,
@@ -42,23 +47,23 @@ class MpcSpec:
         Force by which the target pressures shift per integral of the position error.
     margin_m
         The position stays this far from the end stops.
-    lowest_pa, highest_pa
-        Soft limits of the pressures.
+    lowest_pa, below_supply_pa
+        Soft limits of the pressures, the upper one as its distance from the supply pressure.
     slack_weight
         Cost of violating a limit by 1 mm or 0.1 bar at one sample.
     """
 
     sample_time_s: float = 2e-3
-    horizon: int = 20
+    horizon: int = ranged(20, least=1, most=LONGEST)
     position_m: float = 1e-3
     velocity_m_s: float = 0.1
     pressure_pa: float = 1e6
     opening_v: float = 0.3
     move_v: float = 3.0
-    force_n_m_s: float = 5e4
-    margin_m: float = 2e-3
+    force_n_m_s: float = ranged(5e4)
+    margin_m: float = ranged(2e-3)
     lowest_pa: float = 1.2e5
-    highest_pa: float = 6.9e5
+    below_supply_pa: float = ranged(1e4)
     slack_weight: float = 1e3
     positioning: PositioningSpec = field(default_factory=PositioningSpec)
 
@@ -124,14 +129,51 @@ class Program:
         """Inverse of H, for the optimum without limits."""
         return np.linalg.inv(self.H)
 
+    def law(self, force_n_m_s: float, area_m2: float, sample_time_s: float) -> Law:
+        """The first opening without limits; its memory is the integral and the last opening.
+
+        The integral grows into a force: it pushes the prediction and shifts the target pressures.
+        """
+        n = len(STATES)
+        pull = -2.0 * self.inverse[0, : self.horizon] @ self.forced.T @ self.Q
+        shift = np.tile([0.0, 0.0, -0.5, 0.5], self.horizon) / area_m2
+        integral = force_n_m_s * pull @ (self.pushed - shift)
+        error = np.array([sample_time_s, *np.zeros(n - 1)])
+        C = np.array([integral, 2.0 * self.S * self.inverse[0, 0]])
+        D = pull @ self.free + integral * error
+        return Law(np.array([[1.0, 0.0], C]), np.array([error, D]), C, D)
+
     def solver(self, g: np.ndarray, low: np.ndarray, high: np.ndarray) -> osqp.OSQP:
-        """A fresh OSQP: one that is kept adapts its step length, and would answer by its past."""
+        """OSQP with this gradient and these sides, still to be started.
+
+        It adapts its step length while it solves, so that is set back: the same program from the
+        same start has the same solution to the last bit, whatever was solved before.
+        """
+        self._kept.update(q=g, l=low, u=high)
+        self._kept.update_settings(rho=SETTINGS["rho"])
+        return self._kept
+
+    @cached_property
+    def _kept(self) -> osqp.OSQP:
+        """One solver for all samples, for one thread; to set it up takes longer than to solve.
+
+        It is set up without gradient and sides: its scaling is found there, once and for all.
+        """
         import osqp
 
-        solver = osqp.OSQP()
+        solver, none = osqp.OSQP(), np.full(len(self.rows), np.inf)
         H, rows = sp.csc_matrix(np.triu(self.H)), sp.csc_matrix(self.rows)
-        solver.setup(H, g, rows, low, high, **SETTINGS)
+        solver.setup(H, np.zeros(len(self.H)), rows, -none, none, **SETTINGS)
         return solver
+
+    def prepared(self) -> Program:
+        """The same program with its solver set up, so that the first sample need not wait."""
+        _ = self._kept, self.inverse
+        return self
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but the solver, which another process sets up again."""
+        return {key: value for key, value in self.__dict__.items() if key != "_kept"}
 
 
 def program_of(
@@ -139,10 +181,10 @@ def program_of(
     spec: MpcSpec,
     centre_v: float,
     area_m2: float,
-    stroke_m: float,
+    limits: np.ndarray,
     openings: tuple[float, float],
 ) -> Program:
-    """The condensed program of a mode."""
+    """The condensed program of a mode; ``limits`` as :func:`limits_of` gives them."""
     small, n, N = sampled(mode, spec.sample_time_s), len(STATES), spec.horizon
     tolerable = np.array([spec.position_m, spec.velocity_m_s, spec.pressure_pa, spec.pressure_pa])
     Q, R, S = np.diag(tolerable**-2.0), spec.opening_v**-2.0, spec.move_v**-2.0
@@ -172,11 +214,26 @@ def program_of(
             [np.zeros((len(LIMITED), N)), np.eye(len(LIMITED))],
         ]
     )
-    low = np.tile([spec.margin_m, spec.lowest_pa, spec.lowest_pa] / SLACK_UNIT, N)
-    top_m = stroke_m - spec.margin_m
-    high = np.tile([top_m, spec.highest_pa, spec.highest_pa] / SLACK_UNIT, N)
-    limits = np.array([low, high])
-    return Program(H, rows, free, forced, drift, pushed, stages, R, S, limits, openings)
+    ahead = np.tile(limits / SLACK_UNIT, N)
+    return Program(H, rows, free, forced, drift, pushed, stages, R, S, ahead, openings)
+
+
+def limits_of(plant: Plant, spec: MpcSpec) -> np.ndarray:
+    """Lowest and highest position and pressures, shape (2, 3).
+
+    Raises
+    ------
+    ValueError
+        If nothing is left between them.
+    """
+    highest_pa = float(plant.values[SUPPLY]) - spec.below_supply_pa
+    low = [spec.margin_m, spec.lowest_pa, spec.lowest_pa]
+    high = [stroke_m(plant) - spec.margin_m, highest_pa, highest_pa]
+    if not np.less(low, high).all():
+        what = f"margin_m {spec.margin_m:g}, lowest_pa {spec.lowest_pa:g} and below_supply_pa "
+        what += f"{spec.below_supply_pa:g} leave no room on {plant.name}"
+        raise ValueError(f"mpc: {what}; expected less than half the stroke and the supply pressure")
+    return np.array([low, high])
 
 
 def pushed_mode(mode: Mode, area_m2: float) -> Mode:

@@ -16,8 +16,11 @@ from typing import Any
 import numpy as np
 
 from controllers import CONTROLLERS
+from controllers.spec import replaced
+from linearize.modes import HybridModel
 from linearize.standard import standard_modes
 from workbench.contracts import Controller
+from workbench.errors import whole_file
 from workbench.plant import Plant, require
 from workbench.plants import PLANTS
 
@@ -29,11 +32,13 @@ class Design:
     method       key of :data:`controllers.CONTROLLERS`
     plant        the plant its modes were taken from
     spec         the specification, a dataclass of numbers
+    hybrid       those modes
     """
 
     method: str
     plant: Plant
     spec: Any
+    hybrid: HybridModel
     controller: Controller
 
 
@@ -43,36 +48,23 @@ def design(method: str, plant: Plant, numbers: Mapping[str, Any] | None = None) 
     Raises
     ------
     KeyError
-        If there is no such method, or the specification has no such number.
+        If there is no such method.
+    InputError
+        If a number is unknown or makes no sense.
     """
     if method not in CONTROLLERS:
         raise KeyError(f"no controller {method}; there is {', '.join(CONTROLLERS)}")
     found = CONTROLLERS[method]
-    spec = changed(found.spec(), numbers or {}, method)
-    return Design(method, plant, spec, found.design(standard_modes(plant), spec))
-
-
-def changed(spec: Any, numbers: Mapping[str, Any], where: str) -> Any:
-    """The specification with some numbers replaced, tables inside it likewise."""
-    require(numbers, [f.name for f in fields(spec)], where)
-    values = {f.name: getattr(spec, f.name) for f in fields(spec)}
-    for key, value in numbers.items():
-        old = values[key]
-        inside = f"{where}.{key}"
-        if is_dataclass(old):
-            values[key] = changed(old, value, inside)
-        elif isinstance(value, bool) or not isinstance(value, int | float):
-            raise ValueError(f"{inside} is {value!r}, expected a number")
-        else:
-            values[key] = type(old)(value)
-    return type(spec)(**values)
+    spec = replaced(found.spec(), numbers or {}, method)
+    hybrid = standard_modes(plant)
+    return Design(method, plant, spec, hybrid, found.design(hybrid, spec))
 
 
 def write_design(found: Design, path: Path) -> None:
-    """Write a design, by way of a temporary name, so that no half-written file is left."""
-    part = path.with_name(path.name + ".part")
-    part.write_text("\n".join(_lines(found)) + "\n", encoding="utf-8")
-    part.replace(path)
+    """Write a design, and the folder it is to lie in."""
+    text = "\n".join(_lines(found)) + "\n"
+    with whole_file(path) as unfinished:
+        unfinished.write_text(text, encoding="utf-8")
 
 
 def read_design(path: Path) -> Design:

@@ -19,13 +19,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controllers.condensed import MpcSpec, Program, program_of
+from controllers.condensed import MpcSpec, Program, limits_of, program_of
+from controllers.margins import Law
 from controllers.positioning import STATES, Memory, Positioning, Task, positioning
 from controllers.scheduled import Schedule, scheduled
 from linearize.modes import HybridModel
 from linearize.reduction import closed_command
 from workbench.contracts import Command, Estimate
-from workbench.effects.forces import EndStops
 
 SOLVED = (1, 2)  # OSQP's status: solved, solved inaccurately
 
@@ -48,6 +48,12 @@ class LinearMpc:
     sample_time_s: float
     force_n_m_s: float
     preview: int
+
+    @property
+    def laws(self) -> Schedule[Law]:
+        """What it does while the slide moves and no limit is met: the first move of each plan."""
+        numbers = self.force_n_m_s, self.task.area_m2, self.sample_time_s
+        return self.programs.mapped(lambda program: program.law(*numbers))
 
     def start(self) -> Command:
         return Command(self.task.valve.shut, Memory())
@@ -125,8 +131,8 @@ def linear_mpc(hybrid: HybridModel, spec: MpcSpec | None = None) -> LinearMpc:
     """One program on every mode in which the valve drives the motion."""
     spec = spec or MpcSpec()
     task = positioning(hybrid, spec.positioning)
-    stroke = next(e.upper_m for e in hybrid.plant.effects if isinstance(e, EndStops))
     centre_v = closed_command(hybrid.plant)
-    sizes = centre_v, task.area_m2, stroke, task.valve.openings_v
-    programs = scheduled(hybrid, lambda mode: program_of(mode, spec, *sizes))
+    limits = limits_of(hybrid.plant, spec)
+    sizes = centre_v, task.area_m2, limits, task.valve.openings_v
+    programs = scheduled(hybrid, lambda mode: program_of(mode, spec, *sizes).prepared())
     return LinearMpc(task, programs, spec.sample_time_s, spec.force_n_m_s, spec.horizon + 1)

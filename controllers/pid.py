@@ -6,8 +6,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from controllers.margins import Law
 from controllers.positioning import STATES, Memory, Positioning, PositioningSpec, positioning
 from controllers.scheduled import Schedule, scheduled
+from controllers.spec import ranged
 from linearize.modes import HybridModel, Mode
 from linearize.standard import POSITION, VELOCITY
 from workbench.contracts import Command, Estimate
@@ -40,10 +42,10 @@ class PidSpec:
     """
 
     sample_time_s: float = 2e-3
-    stiffening: float = 8.0
-    share_of_limit: float = 0.4
+    stiffening: float = ranged(8.0, least=1.0, above=True)
+    share_of_limit: float = ranged(0.4, most=1.0, above=True)
     integral_time_s: float = 1.0
-    filter_s: float = 2e-3
+    filter_s: float = ranged(2e-3)
     positioning: PositioningSpec = field(default_factory=lambda: CALM)
 
 
@@ -55,6 +57,16 @@ class PidGain:
     integral: float
     derivative: float
     poles: np.ndarray
+
+    def law(self, sample_time_s: float, filter_s: float) -> Law:
+        """Its memory is the integral of the error and the filtered velocity."""
+        share = sample_time_s / (sample_time_s + filter_s)
+        moved = np.zeros((2, len(STATES)))
+        moved[0, STATES.index(POSITION)], moved[1, STATES.index(VELOCITY)] = sample_time_s, share
+        kept, gains = np.diag([1.0, 1.0 - share]), np.array([self.integral, self.derivative])
+        direct = -gains @ moved
+        direct[STATES.index(POSITION)] -= self.proportional
+        return Law(kept, moved, -gains @ kept, direct)
 
 
 @dataclass(frozen=True)
@@ -70,6 +82,11 @@ class Pid:
     sample_time_s: float
     filter_s: float
     preview: int = 2
+
+    @property
+    def laws(self) -> Schedule[Law]:
+        """What it does while the slide moves and no limit is met."""
+        return self.gains.mapped(lambda gain: gain.law(self.sample_time_s, self.filter_s))
 
     def start(self) -> Command:
         return Command(self.task.valve.shut, Memory(plan=0.0))

@@ -23,6 +23,7 @@ import casadi as ca
 import numpy as np
 
 from controllers.scheduled import Schedule, scheduled
+from controllers.spec import ranged
 from controllers.through_valve import ThroughValve, through_valve
 from linearize.modes import HybridModel, Mode
 from linearize.reduction import closed_command
@@ -61,12 +62,12 @@ class PositioningSpec:
 
     approach_m: float = 0.03
     fastest_m_s: float = 2.0
-    band_m: float = 5e-5
-    leave_m: float = 1e-4
-    resting_m_s: float = 5e-3
-    integrate_m: float = 2e-3
-    stuck_factor: float = 8.0
-    stribeck_share: float = 0.8
+    band_m: float = ranged(5e-5)
+    leave_m: float = ranged(1e-4)
+    resting_m_s: float = ranged(5e-3)
+    integrate_m: float = ranged(2e-3)
+    stuck_factor: float = ranged(8.0)
+    stribeck_share: float = ranged(0.8, most=1.0)
     turn_per_s: float = 50.0
     turn_m_s: float = 0.02
     smooth_v: float = 0.01

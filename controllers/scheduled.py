@@ -17,6 +17,7 @@ from linearize.reduction import closed_command
 from linearize.standard import COMMAND, POSITION, VELOCITY
 
 Design = TypeVar("Design")
+Other = TypeVar("Other")
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,11 @@ class Schedule(Generic[Design]):
         for share, designs in ((ahead, self.forward), (1.0 - ahead, self.backward)):
             yield share * (1.0 - right_share), designs[left]
             yield share * right_share, designs[left + 1]
+
+    def mapped(self, change: Callable[[Design], Other]) -> Schedule[Other]:
+        """The same schedule of what is made of each design."""
+        sides = (tuple(map(change, side)) for side in (self.forward, self.backward))
+        return Schedule(self.positions_m, *sides)
 
     def heaviest(self, position_m: float, ahead: float) -> Design:
         """The design with the largest weight, for what cannot be mixed."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.linalg import solve_discrete_are
 
+from controllers.margins import Law, integral_of
 from controllers.positioning import STATES, Memory, Positioning, PositioningSpec, positioning
 from controllers.scheduled import Schedule, scheduled
 from linearize.discrete import sampled
@@ -38,13 +39,11 @@ class Gain:
     feedback      K in V per unit of state, shape (4,)
     integral      K_i in V/(m s)
     poles         of the closed loop with integral, on the plane of s, 1/s, shape (5,)
-    margin        smallest distance of the loop gain from -1
     """
 
     feedback: np.ndarray
     integral: float
     poles: np.ndarray
-    margin: float
 
 
 @dataclass(frozen=True)
@@ -58,6 +57,12 @@ class StateFeedback:
     gains: Schedule[Gain]
     sample_time_s: float
     preview: int = 2
+
+    @property
+    def laws(self) -> Schedule[Law]:
+        """What it does while the slide moves and no limit is met."""
+        dt = self.sample_time_s
+        return self.gains.mapped(lambda gain: integral_of(gain.feedback, gain.integral, dt))
 
     def start(self) -> Command:
         return Command(self.task.valve.shut, Memory())
@@ -116,7 +121,7 @@ def lq_gain(mode: Mode, spec: LqSpec) -> Gain:
     except np.linalg.LinAlgError as error:
         raise ValueError(f"mode {mode.name!r} cannot be stabilised by its command") from error
     poles = np.log(np.linalg.eigvals(F - G @ K).astype(complex)) / dt
-    return Gain(K[0, :n], float(K[0, n]), poles, stability_margin(F, G, K))
+    return Gain(K[0, :n], float(K[0, n]), poles)
 
 
 def dlqr(
@@ -127,11 +132,3 @@ def dlqr(
     Q = Q * np.outer(scale, scale)
     X = solve_discrete_are(F, G, Q, R)
     return np.linalg.solve(R + G.T @ X @ G, G.T @ X @ F) / scale
-
-
-def stability_margin(F: np.ndarray, G: np.ndarray, K: np.ndarray) -> float:
-    """Smallest |1 + K (z I - F)^-1 G| on the unit circle, 1/M_s of the textbooks."""
-    z = np.exp(1j * np.geomspace(1e-3, np.pi, 400))
-    eye = np.eye(len(F))
-    loop = K @ np.linalg.solve(z[:, None, None] * eye - F, np.broadcast_to(G, (len(z), *G.shape)))
-    return float(np.abs(1.0 + loop).min())

@@ -15,9 +15,25 @@ POSITION, VELOCITY = "slide.position_m", "slide.velocity_m_s"
 PRESSURES = ("chamber_a.pressure_pa", "chamber_b.pressure_pa")
 COMMAND = "valve.command_v"
 
+SUPPLY = "supply.pressure_pa"
+
 SLIDING_M_S = 0.1  # four Stribeck velocities: dry friction is Coulomb's alone
 RESTING_M_S = 1e-3
 CLOSED_V, OPEN_V = 0.01, 0.2  # from the valve's centre, behind the dead zone
+
+
+def stroke_m(plant: Plant) -> float:
+    """Where the slide meets its far end stop.
+
+    Raises
+    ------
+    ValueError
+        If nothing ends the stroke.
+    """
+    ends = [float(e.upper_m) for e in plant.effects if isinstance(e, EndStops)]
+    if not ends:
+        raise ValueError(f"{plant.name} has no end stops; expected end_stops among its effects")
+    return ends[0]
 
 
 def servo_drive_cuts(plant: Plant) -> dict[str, tuple[Interval, ...]]:
@@ -26,7 +42,7 @@ def servo_drive_cuts(plant: Plant) -> dict[str, tuple[Interval, ...]]:
     Source: physics.md 4.3 (valve and friction); thirds because stiffness goes with 1 / volume.
     """
     centre_v = closed_command(plant)
-    third_m = next(e.upper_m for e in plant.effects if isinstance(e, EndStops)) / 3.0
+    third_m = stroke_m(plant) / 3.0
     low_v, high_v = centre_v - CLOSED_V, centre_v + CLOSED_V
     return {
         COMMAND: (

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from studies.text import columns, shown
-from workbench.effects import CATALOGUE
+from workbench.causes import all_causes, why_not
 from workbench.errors import InputError, Message, listed, nearest
 from workbench.plant import Plant
 from workbench.plants import PLANTS
@@ -32,9 +32,8 @@ def plants_text() -> str:
 def effects_text() -> str:
     """One line per cause of the catalogue: name, balance, and the plants that have a place."""
     built = {name: build() for name, build in PLANTS.items()}
-    causes = {cause.name: cause for effect in CATALOGUE for cause in effect.causes}
     rows = []
-    for name, cause in sorted(causes.items()):
+    for name, cause in sorted(all_causes().items()):
         owners = [
             p
             for p, plant in built.items()
@@ -89,7 +88,7 @@ def candidate_name(plant: Plant, effect: str, at: str | None) -> str:
         raise InputError(Message("needs its place", effect, f"--at, for one of {listed(places)}"))
     known = f"one that `workbench effects {plant.name}` lists"
     near = nearest(name, plant.candidates)
-    raise InputError(Message("there is no such effect", name, known, near))
+    raise InputError(Message(why_not(plant, name), name, known, near))
 
 
 def full_names(plant: Plant, names: Sequence[str]) -> tuple[str, ...]:

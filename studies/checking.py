@@ -2,24 +2,33 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from math import isclose
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from controllers.design_file import read_design
-from studies.closed_loop_check import SCENARIOS, Check, check
+from linearize.standard import STANDARD_MODES
+from studies.closed_loop_check import Check, check
 from studies.closed_loop_figures import check_figures
 from studies.figures.style import styled
+from studies.scenarios import SCENARIOS
+from studies.text import shown
+from workbench.contracts import Controller
+from workbench.errors import InputError, Message, listed
 from workbench.plant import Plant, require
 from workbench.rig import Rig
+from workbench.units import public_name
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DRAWS = 1000  # of one parameter until it lies within its bounds
+MOST_NAMED = 5  # values that differ from those of a design
 
 
 def check_rig(
@@ -36,10 +45,12 @@ def check_rig(
     ------
     KeyError
         If a scenario or an estimator does not exist.
+    InputError
+        If the plant has no standard modes, or a design is for another plant.
     """
     names = tuple(scenarios) or tuple(SCENARIOS)
     require(names, SCENARIOS, "the list of scenarios")
-    controllers = {path.stem: read_design(path).controller for path in designs}
+    controllers = _controllers(rig, designs)
     rows, records, rng = [], [], np.random.default_rng(0)
     for number in range(runs):
         progress(f"closed loop, run {number + 1} of {runs}")
@@ -49,6 +60,38 @@ def check_rig(
         rows += [replace(row, design=row.design + mark) for row in found.rows]
         records += found.records
     return Check(tuple(rows), tuple(records))
+
+
+def _controllers(rig: Rig, designs: Iterable[Path]) -> dict[str, Controller]:
+    """The controllers of design files by the file's name; warns where they are for other values."""
+    name = rig.plant.name
+    if name not in STANDARD_MODES:
+        expected = f"a rig of {listed(STANDARD_MODES)}"
+        raise InputError(Message(f"{name} has no standard modes to control", rig.name, expected))
+    read = {path: read_design(path) for path in designs}
+    wrong = [
+        Message(f"is a design for {found.plant.name}", expected=f"one for {name}", file=str(path))
+        for path, found in read.items()
+        if found.plant.name != name
+    ]
+    if wrong:
+        raise InputError(*wrong)
+    for path, found in read.items():
+        if differing := differences(found.plant, rig.plant):
+            what = f"{path}: designed for other values than those of {rig.name}: "
+            warnings.warn(what + listed(differing, MOST_NAMED), stacklevel=3)
+    return {path.stem: found.controller for path, found in read.items()}
+
+
+def differences(designed: Plant, real: Plant) -> list[str]:
+    """Values that a design was made for where the plant has others, and effects it lacked."""
+    theirs, ours = designed.values, real.values
+    lacking = {e.name for e in real.lean().effects} - {e.name for e in designed.effects}
+    return [f"without {name}" for name in sorted(lacking)] + [
+        f"{public_name(name)} {shown(theirs[name], name, 6)} (here {shown(value, name, 6)})"
+        for name, value in ours.items()
+        if name in theirs and not isclose(theirs[name], value, rel_tol=1e-9)
+    ]
 
 
 def drawn(rig: Rig, rng: np.random.Generator) -> Plant:

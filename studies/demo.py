@@ -19,7 +19,7 @@ from linearize.listing import table as mode_table
 from linearize.standard import standard_modes
 from studies.checking import styled_figures
 from studies.closed_loop_check import Check, check
-from studies.closed_loop_check import table as loop_table
+from studies.closed_loop_metrics import table as loop_table
 from studies.documents import check_document, diagnosis_document
 from studies.export import export_modes
 from studies.figures.comparison import comparison_figures

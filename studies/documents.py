@@ -161,8 +161,14 @@ def _where(where: Where) -> Document:
 def _law(law: Law) -> Document:
     return {
         "balance": law.balance,
-        "terms": {name: plain(value) for name, value in law.terms.items()},
-        "ranges": {name: [plain(low), plain(high)] for name, (low, high) in law.ranges.items()},
+        "terms": {
+            public_name(name): {"value": plain(value), "unit": si_unit(name)}
+            for name, value in law.terms.items()
+        },
+        "ranges": {
+            public_name(name): {"low": plain(low), "high": plain(high), "unit": si_unit(name)}
+            for name, (low, high) in law.ranges.items()
+        },
         "error_drop_train": plain(law.drop_train),
         "error_drop_validation": plain(law.drop_validation),
         "text": law.text,

@@ -41,7 +41,6 @@ BAD = {
     "standing": (_cell(9, 0, "0.007"), "", "time stands still at line 10"),
     "no time": (_cell(9, 0, "nan"), "", "no time at line 10"),
     "input missing": (_cell(9, 1, "nan"), "", "1 samples are missing from line 10 on"),
-    "too short": (lambda s: "\n".join(s.splitlines()[:9]), "", "are fewer than the"),
     "beyond skip": (lambda s: s, "skip = 1000", "no rows after the first 1000"),
 }  # fmt: skip
 

@@ -11,9 +11,9 @@ from studies.closed_loop_check import (
     check,
     sensors,
     standard_estimator,
-    step_scenario,
-    table,
 )
+from studies.closed_loop_metrics import table
+from studies.scenarios import step_scenario
 from workbench.closed_loop import Hardware, close_loop
 from workbench.contracts import Command, Estimate
 from workbench.plants.servo_drive import COMMAND, OUTPUTS, servo_drive

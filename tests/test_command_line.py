@@ -7,21 +7,16 @@ import time
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from commands import call
 
-from studies.command_line import ORDER, app
+from studies.command_line import ORDER
 from studies.command_line.application import answering, spread
-from workbench.effects import CATALOGUE
+from workbench.causes import all_causes
 from workbench.plants import PLANTS
 from workbench.reading import read_recording
 from workbench.rig import default_rig, load_rig
 
 RIG = 'name = "drive 7"\nplant = "servo_drive"\n'
-
-
-def call(*words):
-    """What a command answers."""
-    return CliRunner().invoke(app, [str(word) for word in words])
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +65,24 @@ def test_plants_are_listed_one_line_each():
 def test_effects_lists_every_cause_of_the_catalogue():
     words = {line.split()[0] for line in call("effects").stdout.splitlines()[1:]}
 
-    assert words == {cause.name for effect in CATALOGUE for cause in effect.causes}
+    placed = {c.cause.name for build in PLANTS.values() for c in build().candidates.values()}
+    assert placed | {"added_mass", "dead_volume"} <= words
+    assert words == {*all_causes()}
+
+
+@pytest.mark.parametrize("command", [["plants"], ["effects"], ["studies"]])
+def test_lists_take_quiet_like_every_command(command):
+    assert call(*command, "-q").exit_code == 0
+
+
+def test_an_effect_that_sits_on_a_part_is_known_where_it_has_no_place(tmp_path):
+    rig = tmp_path / "rig.toml"
+    rig.write_text('plant = "cylinder_bench"\n[effects]\nadd = ["added_mass", "added_mas"]\n')
+
+    said = call("compare", rig, "run.csv").stderr.splitlines()
+
+    assert "added_mass: cylinder_bench has no place for this effect" in said[0]
+    assert "added_mas: there is no such effect" in said[1]
 
 
 @pytest.mark.parametrize("plant", PLANTS)
@@ -244,11 +256,20 @@ def test_options_take_several_values_in_a_row_behind_the_arguments():
         "rig", "a", "--validate", "b", "--validate", "c", "-o", "d",
     ]  # fmt: skip
     assert spread(["--validate", "b", "rig", "a"], several) == ["--validate", "b", "rig", "a"]
+    assert spread(["rig", "a", "--validate=b", "c", "-o", "d"], several) == [
+        "rig", "a", "--validate=b", "--validate", "c", "-o", "d",
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize(
     ("error", "code"),
-    [(ArithmeticError("diverged"), 3), (ValueError("no"), 2), (KeyboardInterrupt(), 130)],
+    [
+        (ArithmeticError("diverged"), 3),
+        (ValueError("no"), 2),
+        (KeyboardInterrupt(), 130),
+        (StopIteration(), 3),
+        (TypeError("argument of type 'int'\nis not iterable"), 3),
+    ],
 )
 def test_what_goes_wrong_becomes_an_exit_code(error, code):
     import typer
@@ -257,3 +278,18 @@ def test_what_goes_wrong_becomes_an_exit_code(error, code):
         raise error
 
     assert stopped.value.exit_code == code
+
+
+def test_what_nobody_foresaw_is_one_line_and_its_trace_is_shown_when_asked(monkeypatch, capsys):
+    import typer
+
+    with pytest.raises(typer.Exit), answering():
+        raise TypeError("argument of type 'int'\nis not iterable")
+    assert capsys.readouterr().err.splitlines() == [
+        "workbench: inside the program: TypeError argument of type 'int'; "
+        "WORKBENCH_DEBUG=1 shows where"
+    ]
+
+    monkeypatch.setenv("WORKBENCH_DEBUG", "1")
+    with pytest.raises(TypeError), answering():
+        raise TypeError("argument")

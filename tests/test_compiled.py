@@ -23,7 +23,7 @@ def cache(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.delenv("WORKBENCH_NO_COMPILER", raising=False)
-    remembered = (module._compiler, module._folder)
+    remembered = (module._compiler, module._version, module._folder)
     for function in remembered:
         function.cache_clear()
     yield tmp_path / "workbench" / "compiled"
@@ -116,7 +116,7 @@ def test_without_a_compiler_one_line_says_so_and_the_function_serves_itself(
 
     assert results == [function] * 3
     assert len(caplog.records) == 1
-    assert "no C compiler is found" in caplog.text
+    assert "no C compiler works here" in caplog.text
 
 
 def test_the_compiler_can_be_forbidden(cache, monkeypatch):
@@ -125,14 +125,71 @@ def test_the_compiler_can_be_forbidden(cache, monkeypatch):
     assert not machine_code(compiled(small()))
 
 
-@pytest.mark.skipif(not shutil.which("false"), reason="there is no command that always fails")
-def test_a_broken_compiler_costs_a_warning_and_nothing_else(cache, monkeypatch, caplog):
-    monkeypatch.setenv("CC", "false")
+def command(folder, name, lines):
+    """A command of this name, first on the path of whoever prepends the folder."""
+    path = folder / name
+    path.write_text("#!/bin/sh\n" + lines)
+    path.chmod(0o755)
+    return path
+
+
+needs_shell = pytest.mark.skipif(not shutil.which("sh"), reason="there is no shell here")
+
+
+@needs_shell
+def test_a_compiler_that_cannot_compile_costs_a_warning_and_nothing_else(
+    cache, tmp_path, monkeypatch, caplog
+):
+    broken = 'case "$1" in --version) echo 1;; *) echo no room >&2; exit 1;; esac\n'
+    monkeypatch.setenv("CC", str(command(tmp_path, "broken", broken)))
     function = small()
 
     assert compiled(function) is function
-    assert "small is not compiled" in caplog.text
+    assert "small is not compiled: no room" in caplog.text
     np.testing.assert_allclose(function(1.0).full(), 2.0 * np.sin(1.0))
+
+
+@needs_shell
+def test_a_compiler_that_only_says_how_to_get_one_is_none_and_that_is_said_once(
+    cache, tmp_path, monkeypatch, caplog
+):
+    """As /usr/bin/cc on a Mac without its developer tools."""
+    for name in module.COMPILERS:
+        command(tmp_path, name, "echo install the tools >&2\nexit 1\n")
+    monkeypatch.setenv("PATH", str(tmp_path))
+    functions = [small(), small("other")]
+    with caplog.at_level(logging.INFO, logger="workbench"):
+        results = [compiled(function) for function in functions]
+
+    assert results == functions
+    assert [record.levelno for record in caplog.records] == [logging.INFO]
+
+
+@needs_compiler
+def test_a_damaged_library_is_compiled_once_more(cache, caplog):
+    compiled(small())
+    (library,) = cache.iterdir()
+    library.unlink()  # the old one is still open
+    library.write_bytes(b"no library")
+
+    assert machine_code(compiled(small()))
+    assert machine_code(compiled(small()))
+    assert not caplog.records and library.stat().st_size > 100
+
+
+def test_the_command_line_says_once_that_there_is_no_compiler(cache, monkeypatch, capsys):
+    from studies.command_line.application import answering
+
+    monkeypatch.setenv("WORKBENCH_NO_COMPILER", "1")
+    with answering():
+        compiled(small())
+        compiled(small("other"))
+    assert capsys.readouterr().err.count("WORKBENCH_NO_COMPILER is set") == 1
+
+    module._compiler.cache_clear()
+    with answering(quiet=True):
+        compiled(small())
+    assert capsys.readouterr().err == ""
 
 
 @needs_compiler

@@ -11,7 +11,7 @@ from workbench.diagnosis.scan import scan
 from workbench.fitting.fit import fit
 from workbench.fitting.problem import pose
 from workbench.recording import Recording
-from workbench.rig import default_rig, load_rig
+from workbench.rig import load_rig
 from workbench.rig_writing import rig_text
 
 AREA_M2 = 5.187e-4
@@ -69,6 +69,13 @@ def test_every_effect_of_the_plant_stands_in_the_ranking_once(rig, found):
     names = [row.candidate.name for row in found.ranking]
 
     assert sorted(names) == sorted(rig.plant.candidates)
+
+
+def test_stiction_is_not_asked_for_without_coulomb_friction(found):
+    row = next(row for row in found.ranking if row.candidate.name == "stiction")
+
+    assert row.decided_by is DecidedBy.NOT_APPLICABLE
+    assert row.reasons == ("nothing without friction.coulomb_force_n",)
 
 
 def test_what_was_not_followed_says_so(found):
@@ -138,12 +145,12 @@ def test_a_standard_deviation_says_how_far_sizes_scatter(rig):
 
 def test_the_shape_that_the_scan_found_is_kept_by_the_refit(rig):
     def stribeck(v):
-        return coulomb(v) + 6.0 * np.sign(v) * np.exp(-((v / 0.01) ** 2))
+        return coulomb(v) + 6.0 * np.sign(v) * np.exp(-((v / 0.008) ** 2))
 
     train, held_out = [bench(1, stribeck), bench(3, stribeck)], [bench(2, stribeck)]
     step = add(add(rig, "coulomb_friction", train, held_out).rig, "stiction", train, held_out)
 
-    assert step.rig.plant.values["friction.stribeck_velocity_m_s"] == 0.01
+    assert step.rig.plant.values["friction.stribeck_velocity_m_s"] == 0.008
     assert step.rig.plant.values["friction.stiction_excess_n"] == pytest.approx(6.0, rel=0.15)
 
 
@@ -233,7 +240,3 @@ def test_a_fit_reports_priors_bounds_and_correlations(rig):
     assert row.value == pytest.approx(8.0, rel=0.05)
     assert row.deviation < row.prior_deviation
     assert np.allclose(np.diag(report.correlations), 1.0)
-
-
-def test_default_rigs_are_ready_for_diagnosis():
-    assert default_rig("cylinder_bench").added == ()

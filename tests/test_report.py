@@ -1,4 +1,4 @@
-"""Results as text, JSON, figures and one page that needs no network."""
+"""Results as text, JSON and figures."""
 
 import json
 import math
@@ -13,7 +13,6 @@ from studies.figures.diagnosis import diagnosis_figures
 from studies.figures.improvement import before_after_figure, budget_figure
 from studies.figures.modes import pole_figure
 from studies.figures.style import new_figure, save, styled
-from studies.report import Section, render_folder, write_report
 from studies.text import columns, shown
 from studies.text_of_results import correlation_lines, diagnosis_text, unit_names
 from workbench.diagnosis.result import (
@@ -27,7 +26,7 @@ from workbench.diagnosis.result import (
     Where,
 )
 from workbench.effect import Kind
-from workbench.errors import InputError
+from workbench.effects.empirical import EmpiricalForce
 from workbench.fitting.errors import SignalError
 from workbench.plants import PLANTS
 
@@ -133,12 +132,23 @@ def test_nothing_missing_names_no_effect():
 
 
 def test_an_empirical_law_comes_with_its_range():
-    law = Law("slide.momentum", {"v|v|": -240.0}, {"velocity": (-0.5, 0.5)}, 0.8, 0.7, "-240 v|v|")
+    force = EmpiricalForce(name="law@slide", body="slide")
+    terms = {f"law@slide.{cause.strength}": -240.0 for cause in force.causes}
+    ranges = {"slide.velocity_m_s": (-0.5, 0.5), "chamber_a.pressure_pa": (3e5, 6e5)}
+    law = Law("slide.momentum", terms, ranges, 0.8, 0.7, "-240 v|v|")
 
     document = diagnosis_document(diagnosis(Verdict.NOT_IN_CATALOGUE, law=law), UNITS)
 
-    assert document["law"]["terms"] == {"v|v|": -240.0}
-    assert document["law"]["ranges"] == {"velocity": [-0.5, 0.5]}
+    assert document["law"]["terms"] == {
+        "law@slide.quadratic": {"value": -240.0, "unit": "N s^2/m^2"},
+        "law@slide.cubic": {"value": -240.0, "unit": "N s^3/m^3"},
+        "law@slide.placed_viscous": {"value": -240.0, "unit": "N s/m^2"},
+        "law@slide.curved": {"value": -240.0, "unit": "N/m^2"},
+    }
+    assert document["law"]["ranges"] == {
+        "slide.velocity": {"low": -0.5, "high": 0.5, "unit": "m/s"},
+        "chamber_a.pressure": {"low": 3e5, "high": 6e5, "unit": "Pa"},
+    }
 
 
 def test_a_diagnosis_reads_in_the_units_of_people():
@@ -224,56 +234,3 @@ def test_two_runs_give_the_same_bytes(tmp_path):
         return [(tmp_path / f"{stem}.{e}").read_bytes() for e in ("pdf", "svg", "csv")]
 
     assert drawn("one") == drawn("two")
-
-
-@pytest.fixture
-def page(figures, tmp_path):
-    for name in ("poles", "budget"):
-        save(figures[name], tmp_path / "figures" / name, "workbench demo")
-    sections = [
-        Section("Modes <&>", ("Some text.",), "a  b\n1  2", ("poles",)),
-        Section("Error", figures=("budget",)),
-    ]
-    return write_report(tmp_path, "From a recording", "workbench demo", sections)
-
-
-def test_a_page_holds_its_figures_and_needs_no_network(page):
-    text = page.read_text()
-
-    assert text.count("<svg") == 2
-    assert "Modes &lt;&amp;&gt;" in text and "1  2" in text
-    assert not re.search(r'(src|href)="(?!#)', text)
-    assert not re.search(r"@import|url\((?!#)|<metadata", text)
-
-
-def test_names_inside_a_page_are_its_own(page):
-    names = re.findall(r'\bid="([^"]+)"', page.read_text())
-    used = re.findall(r'href="#([^"]+)"|url\(#([^)]+)\)', page.read_text())
-
-    assert len(names) == len(set(names))
-    assert {a or b for a, b in used} <= set(names)
-
-
-def test_a_page_can_be_made_again_from_its_folder(page):
-    before = page.read_bytes()
-    page.unlink()
-
-    assert render_folder(page.parent).read_bytes() == before
-
-
-def test_a_folder_of_figures_alone_makes_a_page_too(figures, tmp_path):
-    save(figures["budget"], tmp_path / "budget", "workbench improve")
-
-    assert "<h2>1. budget</h2>" in render_folder(tmp_path).read_text()
-
-
-def test_an_empty_folder_is_refused(tmp_path):
-    with pytest.raises(InputError, match="nothing to report"):
-        render_folder(tmp_path)
-
-
-def test_a_report_of_others_is_refused(tmp_path):
-    (tmp_path / "report.json").write_text('{"a": 1}')
-
-    with pytest.raises(InputError, match="no report of ours"):
-        render_folder(tmp_path)

@@ -162,6 +162,17 @@ def test_all_that_is_wrong_is_said_at_once_in_the_order_of_the_lines():
     assert [line.split(":")[1] for line in said] == ["5", "9", "15"]
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("[recording]\n", "[recording]\nskip = -3\n", "21: skip: -3 rows cannot be skipped"),
+        ('unit = "s" }', 'step = "1 ms" }', "does not go with step; expected a column of times or"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused_and_not_altered(old, new, said):
+    assert said in messages(TEXT.replace(old, new, 1)).replace("rig:", "")
+
+
 def test_a_missing_file_names_one_that_looks_like_it(tmp_path):
     (tmp_path / "drive7.toml").write_text(TEXT)
 

@@ -40,7 +40,7 @@ def compiled(function: ca.Function) -> ca.Function:
     if not compiler:
         return function
     try:
-        return ca.external(function.name(), str(_library(function, compiler)))
+        return _loaded(function, compiler)
     except (OSError, RuntimeError, subprocess.SubprocessError) as error:
         reason = getattr(error, "stderr", None) or str(error)
         log.warning("%s is not compiled: %s", function.name(), reason.strip()[:300])
@@ -54,10 +54,20 @@ def _compiler(wanted: str, forbidden: str) -> tuple[str, ...]:
         log.info("WORKBENCH_NO_COMPILER is set: functions run in CasADi's virtual machine")
         return ()
     for command in (shlex.split(wanted), *([name] for name in COMPILERS)):
-        if command and shutil.which(command[0]):
+        if command and _version(tuple(command)):
             return tuple(command)
-    log.info("no C compiler is found: functions run in CasADi's virtual machine, which is slower")
+    log.info("no C compiler works here: functions run in CasADi's virtual machine, which is slower")
     return ()
+
+
+def _loaded(function: ca.Function, compiler: tuple[str, ...]) -> ca.Function:
+    """The function from its library, which is compiled once more if it is damaged."""
+    library = _library(function, compiler)
+    try:
+        return ca.external(function.name(), str(library))
+    except RuntimeError:
+        library.unlink(missing_ok=True)
+        return ca.external(function.name(), str(_library(function, compiler)))
 
 
 def _library(function: ca.Function, compiler: tuple[str, ...]) -> Path:
@@ -87,9 +97,18 @@ def _compile(code: str, library: Path, command: tuple[str, ...]) -> None:
 
 @cache
 def _version(compiler: tuple[str, ...]) -> str:
+    """What the compiler says it is; empty where it does not run.
+
+    A Mac without its developer tools has a ``cc`` that only says how to get them.
+    """
+    if not shutil.which(compiler[0]):
+        return ""
     command = [*compiler, "--version"]
-    answer = subprocess.run(command, capture_output=True, text=True, check=True, timeout=TIMEOUT_S)
-    return answer.stdout
+    try:
+        answer = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT_S)
+    except (OSError, subprocess.SubprocessError):
+        return ""
+    return "" if answer.returncode else answer.stdout + answer.stderr
 
 
 @cache

@@ -168,6 +168,8 @@ class Cause:
     kind, held  a shift of the fitted field ``held`` is scored with that field at its prior
     sizes       shares of the typical strength that the scan tries (both signs where signed)
     shapes      values of form fields to scan, by field
+    needs       field that must not be at its null for this cause to be one: static friction is
+                counted over Coulomb's, and means nothing without it
     tolerated   (standard deviation, largest size) of what is always there and never worth a name:
                 a fit may use that much of the strength as a nuisance
     shown_by    the recording that shows it
@@ -186,6 +188,7 @@ class Cause:
     held: str | None = None
     sizes: tuple[float, ...] = ONE_SIDED
     shapes: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    needs: str | None = None
     tolerated: tuple[float, float] | None = None
 
 

@@ -263,3 +263,6 @@ class Chamber(Part):
             + (kappa - 1.0) * total(got, HeatFlow)
         )
         return {"pressure_pa": energy_w / own.volume_m3, "mass_kg": total(got, MassFlow)}
+
+
+PARTS = (Supply, Atmosphere, Body, HeldRod, PressureFace, Chamber)

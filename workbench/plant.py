@@ -119,6 +119,13 @@ class Plant:
         rest = tuple(n for n in self.measured + self.optional_outputs if n not in names)
         return replace(self, measured=tuple(names), optional_outputs=rest)
 
+    def ready_for(self, candidate: Candidate) -> bool:
+        """False where what the cause needs is itself absent."""
+        if not candidate.cause.needs:
+            return True
+        name = f"{candidate.member}.{candidate.cause.needs}"
+        return self.values[name] != self.parameters[name].null
+
     def at_null(self, *candidates: Candidate) -> Plant:
         """The same plant with these causes absent."""
         known = self.parameters

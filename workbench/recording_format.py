@@ -109,7 +109,7 @@ def read_format(text: RigText, plant: Plant) -> RecordingFormat:
         time=_time(text),
         channels=_channels(text, plant) if "channels" in section else usual.channels,
         header=text.typed(("recording", "header"), bool, True, "true or false"),
-        skip=max(text.typed(("recording", "skip"), int, 0, "a number of rows"), 0),
+        skip=_skip(text),
         separator=_character(text, "separator", SEPARATORS),
         decimal=_character(text, "decimal", {}, among=".,"),
         thousands=_character(text, "thousands", {}),
@@ -154,6 +154,9 @@ def _time(text: RigText) -> TimeFormat:
     entry = text.typed(place, dict, {}, '{ column = "time_s", unit = "s" }')
     text.keys_among(place, entry, ("column", "unit", "step"))
     if "step" in entry:
+        for key in {"column", "unit"} & entry.keys():
+            expected = "a column of times or the step between rows"
+            text.wrong((*place, key), "does not go with step", expected=expected)
         return TimeFormat(None, "s", _seconds(text, (*place, "step")))
     unit = text.typed((*place, "unit"), str, "s", "a unit of time")
     try:
@@ -220,6 +223,14 @@ def _character(text: RigText, key: str, words: Mapping[str, str], among: str = "
     if len(found) != 1 or (among and found not in among):
         expected = f"one of {' '.join(among)}" if among else "one character"
         text.wrong(place, f"{found!r} is no {key}", expected=" or ".join([expected, *words]))
+    return found
+
+
+def _skip(text: RigText) -> int:
+    place, rows = ("recording", "skip"), "a number of rows from 0 on"
+    found = text.typed(place, int, 0, rows)
+    if found < 0:
+        text.wrong(place, f"{found} rows cannot be skipped", expected=rows)
     return found
 
 

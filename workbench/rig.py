@@ -9,8 +9,8 @@ from functools import cached_property
 from math import inf
 from pathlib import Path
 
+from workbench.causes import why_not
 from workbench.effect import Parameter
-from workbench.effects import CATALOGUE
 from workbench.errors import InputError, Message, listed
 from workbench.plant import Plant
 from workbench.plants import PLANTS
@@ -192,14 +192,9 @@ def _candidates(plant: Plant, name: str) -> list[str]:
 
 
 def _no_such_cause(text: RigText, place: tuple[str, ...], plant: Plant, item: str) -> None:
-    known = {cause.name for effect in CATALOGUE for cause in effect.causes}
-    if item.partition("@")[0] in known:
-        what = f"{plant.name} has no place for this effect"
-    else:
-        what = "there is no such effect"
     near = [*plant.candidates, *(c.cause.name for c in plant.candidates.values())]
     expected = f"one that `workbench effects {plant.name}` lists"
-    text.wrong(place, what, item=item, expected=expected, known=near)
+    text.wrong(place, why_not(plant, item), item=item, expected=expected, known=near)
 
 
 def _values(text: RigText, plant: Plant, removed: tuple[str, ...]) -> dict[str, float]:

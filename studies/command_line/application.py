@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+import os
 import shlex
 import sys
 import time
@@ -15,6 +17,7 @@ import typer
 from typer.core import TyperCommand
 
 DONE, NO, WRONG_INPUT, SOLVER_FAILED, STOPPED = 0, 1, 2, 3, 130
+DEBUG = "WORKBENCH_DEBUG"  # set to anything, what is unforeseen is shown in full
 
 app = typer.Typer(
     name="workbench",
@@ -44,7 +47,8 @@ def spread(args: list[str], several: set[str]) -> list[str]:
     for arg in args:
         if arg.startswith("-"):
             behind = bool(found) and not found[0].startswith("-")
-            current = arg if arg in several and behind else ""
+            name = arg.partition("=")[0]  # --validate=a.csv
+            current = name if name in several and behind else ""
             found.append(arg)
         elif current and found[-1] != current:
             found += [current, arg]
@@ -79,10 +83,9 @@ def answering(quiet: bool = False) -> Iterator[Callable[[str], None]]:
         if not quiet:
             typer.echo(f"[{time.monotonic() - begun:5.1f} s] {message}", err=True)
 
-    before = warnings.showwarning
-    warnings.showwarning = _warned
     try:
-        yield say
+        with _told(say):
+            yield say
     except InputError as error:
         _stop(str(error), WRONG_INPUT)
     except (ArithmeticError, _linear_algebra_error()) as error:
@@ -93,8 +96,44 @@ def answering(quiet: bool = False) -> Iterator[Callable[[str], None]]:
         _stop(f"{error.filename or ''}: {error.strerror or error}".lstrip(": "), WRONG_INPUT)
     except KeyboardInterrupt:
         _stop("stopped; no file is half-written", STOPPED)
+    except (typer.Exit, typer.Abort):
+        raise
+    except Exception as error:
+        if os.environ.get(DEBUG):
+            raise
+        _stop(_unforeseen(error), SOLVER_FAILED)
+
+
+@contextmanager
+def _told(say: Callable[[str], None]) -> Iterator[None]:
+    """Warnings and what the library logs go to stderr; information only where progress goes."""
+    before, log, teller = warnings.showwarning, logging.getLogger("workbench"), _Teller(say)
+    level = log.level
+    warnings.showwarning = _warned
+    log.addHandler(teller)
+    log.setLevel(logging.INFO)
+    try:
+        yield
     finally:
         warnings.showwarning = before
+        log.removeHandler(teller)
+        log.setLevel(level)
+
+
+class _Teller(logging.Handler):
+    def __init__(self, say: Callable[[str], None]) -> None:
+        super().__init__()
+        self.say = say
+
+    def emit(self, record: logging.LogRecord) -> None:
+        tell = _warned if record.levelno >= logging.WARNING else self.say
+        tell(record.getMessage())
+
+
+def _unforeseen(error: Exception) -> str:
+    """One line for what nobody foresaw, with the way to its details."""
+    said = f"{type(error).__name__} {error}".strip().split("\n")[0]
+    return f"inside the program: {said}; {DEBUG}=1 shows where"
 
 
 def example(command: str) -> str:
@@ -120,54 +159,3 @@ def _warned(message: Warning | str, *_: object, **__: object) -> None:
 def command_text() -> str:
     """The command as it was typed, for what is written beside a figure."""
     return shlex.join(["workbench", *sys.argv[1:]])
-
-
-def writable(*paths: Path | None) -> None:
-    """Refuse, before any work, a file to write whose name is a folder.
-
-    Raises
-    ------
-    InputError
-        Naming the folder.
-    """
-    from workbench.errors import InputError, Message
-
-    for path in filter(None, paths):
-        if path.is_dir():
-            raise InputError(Message("is a folder", str(path), "the name of a file to write"))
-
-
-def write_json(path: Path | None, document: dict[str, Any]) -> None:
-    """Write a document, if a file is wanted."""
-    if path is None:
-        return
-    import json
-
-    from workbench.errors import whole_file
-
-    with whole_file(path) as unfinished:
-        text = json.dumps(document, indent=2, allow_nan=False)
-        unfinished.write_text(text + "\n", encoding="utf-8")
-
-
-def read_all(rig: Any, paths: list[Path] | None, say: Callable[[str], None]) -> list[Any]:
-    """All recordings of a rig; what is wrong with any of them is said at once.
-
-    Raises
-    ------
-    InputError
-        With the messages of all recordings.
-    """
-    from workbench.errors import InputError
-    from workbench.reading import read_recording
-
-    found, wrong = [], []
-    for path in paths or ():
-        say(f"reading {path}")
-        try:
-            found.append(read_recording(rig, path))
-        except InputError as error:
-            wrong += error.messages
-    if wrong:
-        raise InputError(*wrong)
-    return found

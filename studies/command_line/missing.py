@@ -19,10 +19,8 @@ from studies.command_line.application import (
     app,
     command_text,
     example,
-    read_all,
-    writable,
-    write_json,
 )
+from studies.command_line.files import read_all, read_to_fit, writable, write_json
 
 DIAGNOSE = "workbench diagnose rig.toml train.csv --validate validation.csv --json found.json"
 ADD = (
@@ -52,9 +50,9 @@ def diagnose(
         from workbench.diagnosis.diagnose import diagnose as find_missing
         from workbench.rig import load_rig
 
-        writable(json)
+        writable(json, folders=[figures])
         known = load_rig(rig)
-        read = read_all(known, train, say)
+        read = read_to_fit(known, train, say)
         held_out = read_all(known, validate, say)
         found = find_missing(known, read, held_out, say)
         units = unit_names(known.plant.measured + known.plant.optional_outputs)
@@ -91,7 +89,7 @@ def add(
         writable(output)
         known = load_rig(rig)
         name = candidate_name(known.plant, effect, at)
-        read, held_out = read_all(known, fit, say), read_all(known, validate, say)
+        read, held_out = read_to_fit(known, fit, say), read_all(known, validate, say)
         found = add_effect(known, name, read, held_out, say)
         write_rig(found.rig, output)
         typer.echo(addition_text(found, unit_names(known.plant.measured)))
@@ -116,9 +114,9 @@ def improve(
         from workbench.rig import load_rig
         from workbench.rig_writing import write_rig
 
-        writable(output)
+        writable(output, folders=[report])
         known = load_rig(rig)
-        read, held_out = read_all(known, train, say), read_all(known, validate, say)
+        read, held_out = read_to_fit(known, train, say), read_all(known, validate, say)
         found = improve_rig(known, read, held_out, say)
         write_rig(found.rig, output)
         if report:
@@ -153,10 +151,9 @@ def fit(
 
         writable(output)
         known = load_rig(rig)
-        read, held_out = read_all(known, train, say), read_all(known, validate, say)
-        found = fit_rig(
-            known, read, held_out, only=full_names(known.plant, only or ()), progress=say
-        )
+        names = full_names(known.plant, only or ())
+        read, held_out = read_to_fit(known, train, say, names), read_all(known, validate, say)
+        found = fit_rig(known, read, held_out, only=names, progress=say)
         write_rig(found.rig, output)
         typer.echo(fit_text(found, unit_names(known.plant.measured)))
         typer.echo(f"wrote {output}")

@@ -17,10 +17,8 @@ from studies.command_line.application import (
     app,
     command_text,
     example,
-    read_all,
-    writable,
-    write_json,
 )
+from studies.command_line.files import read_all, writable, write_json
 
 
 @app.command(cls=Spread, epilog=example("workbench simulate rig.toml train.csv -o simulated.csv"))
@@ -68,7 +66,7 @@ def compare(
         from workbench.comparison import compare
         from workbench.rig import load_rig
 
-        writable(json)
+        writable(json, folders=[figures])
         found = load_rig(rig)
         read = read_all(found, recordings, say)
         say("comparing: one step, windows, free run")

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from studies.command_line.application import Quiet, Spread, answering, app, command_text, example
+from studies.command_line.files import writable
 
 
 @app.command(cls=Spread, epilog=example("workbench demo -o demo"))
@@ -22,6 +23,7 @@ def demo(
     with answering(quiet) as say:
         from studies.demo import run_demo
 
+        writable(folders=[output])
         run_demo(output, command_text(), say, typer.echo)
 
 
@@ -32,7 +34,8 @@ def report(
 ) -> None:
     """One self-contained HTML file from what a folder holds."""
     with answering(quiet) as say:
-        from studies.report import render_folder
+        from studies.report import PAGE, render_folder
 
+        writable(folder / PAGE)
         say(f"reading {folder}")
         typer.echo(f"wrote {render_folder(folder)}")

@@ -1,5 +1,5 @@
 """One self-contained HTML file from results: no network, figures as inline SVG."""
 
-from studies.report.page import Section, render_folder, write_report
+from studies.report.page import PAGE, Section, render_folder, write_report
 
-__all__ = ["Section", "render_folder", "write_report"]
+__all__ = ["PAGE", "Section", "render_folder", "write_report"]

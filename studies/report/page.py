@@ -14,6 +14,7 @@ from pathlib import Path
 from workbench.errors import InputError, Message, whole_file
 
 SECTIONS, PAGE, FIGURES = "report.json", "report.html", "figures"
+ENDINGS = (".pdf", ".svg", ".csv")
 SCHEMA = "workbench.report/1"
 TEMPLATE = Path(__file__).with_name("page.html.j2")
 
@@ -89,14 +90,17 @@ def _read(folder: Path) -> tuple[str, str, list[Section]]:
 
 
 def _drawn(folder: Path, name: str) -> dict[str, str]:
-    """The SVG of a figure, and the command that made it."""
+    """The SVG of a figure, its files from the report's folder, and the command that made it."""
     places = (folder / FIGURES, folder)
     svg = next((p for p in (place / f"{name}.svg" for place in places) if p.is_file()), None)
     if svg is None:
         raise InputError(Message("there is no such figure", name, file=str(folder)))
     command = svg.with_suffix(".txt")
     said = command.read_text(encoding="utf-8").strip() if command.is_file() else ""
-    return {"name": name, "svg": inline(svg.read_text(encoding="utf-8"), name), "command": said}
+    beside = [p for p in map(svg.with_suffix, ENDINGS) if p.is_file()]
+    files = ", ".join(path.relative_to(folder).as_posix() for path in beside)
+    drawn = inline(svg.read_text(encoding="utf-8"), name)
+    return {"svg": drawn, "files": files, "command": said}
 
 
 def inline(svg: str, name: str) -> str:

@@ -7,7 +7,7 @@ Source: physics.md section 2.4 (paper 002, tables 5 and 6, with the errata of se
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -143,8 +143,3 @@ def join(states: Sequence[State]) -> State:
             for f in fields(State)
         }
     )
-
-
-def altered(drive: Drive, changes: dict[str, float]) -> Drive:
-    """The drive with fields replaced; an unknown name raises TypeError."""
-    return replace(drive, **changes)

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from workbench.diagnosis.judge import (
     CLEARLY_LESS,
     HELD_OUT_REASON,
+    LEAST_TRAINING,
     SHARE_REASON,
     predicts,
     reasons_against,
@@ -29,6 +30,7 @@ from workbench.effect import Kind
 from workbench.fitting.errors import errors_of
 from workbench.fitting.problem import Problem, improved_base, pose, split
 from workbench.fitting.windows import MOST_WINDOWS
+from workbench.plant import Candidate
 from workbench.recording import Recording
 from workbench.rig import Rig
 
@@ -116,9 +118,12 @@ def _followed(problem: Problem, progress: Progress) -> _Followed:
     """Scan the catalogue and refit the best few."""
     progress("scan of the catalogue")
     profiles = _scanned(problem)
-    refits = []
+    refits: list[Refit] = []
     for rank, profile in enumerate(profiles[:REFITTED]):
-        if rank < ALWAYS_REFITTED or profile.drop > WORTH_A_REFIT * profiles[0].drop:
+        accepted = any(not reasons_against(problem.base, each) for each in refits)
+        promising = profile.drop > WORTH_A_REFIT * profiles[0].drop
+        hopeful = not accepted and profile.drop > LEAST_TRAINING * problem.misfit
+        if rank < ALWAYS_REFITTED or promising or hopeful:
             progress(f"refit with {profile.candidate.name}")
             refits.append(refit(problem, profile))
     moved = shifts(problem)
@@ -138,7 +143,7 @@ def _scanned(problem: Problem) -> list[Profile]:
     absent = [
         c
         for c in problem.whole.candidates.values()
-        if c.held is None and c not in problem.added
+        if c.held is None and c not in problem.added and base.windows.plant.ready_for(c)
         and (c.cause.tolerated or values.get(c.strength, known[c.strength].null)
              == known[c.strength].null)
     ]  # fmt: skip
@@ -174,7 +179,6 @@ def _not_asked(problem: Problem, asked: set[str]) -> list[Ranked]:
 
     Where the recording measures what a cause produces, the cause has no place.
     """
-    here = problem.whole.candidates
     nothing = float("nan")
     return [
         Ranked(
@@ -187,11 +191,19 @@ def _not_asked(problem: Problem, asked: set[str]) -> list[Ranked]:
             compensable=nothing,
             decided_by=DecidedBy.NOT_APPLICABLE,
             accepted=False,
-            reasons=("there already" if name in here else "not applicable: measured",),
+            reasons=(_reason_not_asked(problem, candidate),),
         )
         for name, candidate in problem.rig.plant.candidates.items()
         if name not in asked
     ]
+
+
+def _reason_not_asked(problem: Problem, candidate: Candidate) -> str:
+    if candidate.name not in problem.whole.candidates:
+        return "not applicable: measured"
+    if not problem.rig.plant.ready_for(candidate):
+        return f"nothing without {candidate.member}.{candidate.cause.needs}"
+    return "there already"
 
 
 def predicts_row(row: Ranked) -> bool:

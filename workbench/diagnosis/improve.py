@@ -16,7 +16,7 @@ from workbench.diagnosis.diagnose import WEAK_EVIDENCE, Progress, diagnose, sile
 from workbench.diagnosis.refit import refit
 from workbench.diagnosis.result import Diagnosis
 from workbench.diagnosis.scan import scan
-from workbench.fitting.errors import Errors, errors_of
+from workbench.fitting.errors import Errors, errors_of, per_sample
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.posterior import fitted_rig, posterior_deviation
 from workbench.fitting.problem import Problem, pose, split
@@ -253,15 +253,6 @@ def _budget(
     bases = [(each.base, each.base_validation) for each in diagnoses]
     fits = [*bases, *((step.fit, step.validation_fit) for step in steps[len(bases) - 1 :])]
     return tuple(
-        (label, _per_sample(fit), _per_sample(held_out))
+        (label, per_sample(fit), per_sample(held_out))
         for label, (fit, held_out) in zip(labels, fits, strict=False)
     )
-
-
-def _per_sample(fit: Fit | None) -> float:
-    """Mean squared error in noise deviations: the same yardstick in every round."""
-    if fit is None:
-        return float("nan")
-    windows = fit.windows
-    error = fit.residual * windows.scale[:, :, None] / windows.noise[:, None, None]
-    return float((error**2).sum() / windows.count)

@@ -5,7 +5,8 @@ the criterion.  A candidate is accepted when
 
 1. the effective-sample BIC falls by more than 4: scales already carry the correlation time, so
    dBIC = dchi2 / s2 - k ln(n_eff) with s2 the misfit per effective sample of the better model,
-2. a held-out recording with frozen parameters is predicted better by more than 2 %,
+2. a held-out recording with frozen parameters is predicted better by more than 2 %, and its plain
+   squared error, in which single windows may count for much, does not grow by more than 2 %,
 3. at least 20 % of the misfit beyond noise goes away, as the mean over training and held-out
    recordings and with no less than 10 % in training: less may stand for something else,
 4. its size is inside its bounds, more than 3 % of typical, and more than two standard deviations
@@ -24,7 +25,9 @@ from workbench.fitting.gauss_newton import Fit
 
 LEAST_BIC = 4.0
 LEAST_HELD_OUT = 0.02
+MOST_PLAIN = 1.02
 LEAST_SHARE = 0.20
+LEAST_TRAINING = 0.10
 LEAST_SIZE = 0.03
 DISTINCT = 2.0  # posterior standard deviations
 LARGEST_TIE = 3
@@ -44,21 +47,25 @@ def reasons_against(base: Fit, refit: Refit) -> tuple[str, ...]:
         against.append("gains less than its parameters cost")
     if not predicts(refit):
         against.append(HELD_OUT_REASON)
-    if _share(refit) < LEAST_SHARE or refit.drop_train < LEAST_SHARE / 2:
+    if _share(refit) < LEAST_SHARE or refit.drop_train < LEAST_TRAINING:
         against.append(SHARE_REASON)
     return (*against, *_size_reasons(refit))
 
 
 def predicts(refit: Refit) -> bool:
     """True where the held-out recording is predicted better, or there is none."""
-    return isnan(refit.drop_validation) or refit.drop_validation > LEAST_HELD_OUT
+    if isnan(refit.drop_validation):
+        return True
+    grows = refit.plain_validation > MOST_PLAIN
+    return refit.drop_validation > LEAST_HELD_OUT and not grows
 
 
 def _share(refit: Refit) -> float:
     """Share of the misfit that goes away, mean of training and held-out."""
     if isnan(refit.drop_validation):
         return refit.drop_train
-    return (refit.drop_train + refit.drop_validation) / 2
+    unseen = max(refit.drop_validation, 1.0 - refit.plain_validation)
+    return (refit.drop_train + unseen) / 2
 
 
 def _bic_gain(base: Fit, fit: Fit, parameters: int) -> float:

@@ -15,6 +15,7 @@ from workbench.diagnosis.result import Size
 from workbench.diagnosis.scan import Profile, Trial
 from workbench.diagnosis.shifts import Shift
 from workbench.fitting.error_model import OUTLYING
+from workbench.fitting.errors import per_sample
 from workbench.fitting.gauss_newton import Fit, best_start, fit_windows
 from workbench.fitting.linearised import Linearised, Point, borrowed
 from workbench.fitting.posterior import posterior_deviation
@@ -35,7 +36,10 @@ PROBES = (0.4, 0.6, 0.8, 0.9, 1.15, 1.4, 1.8, 2.5)  # factors on a fitted streng
 class Refit:
     """A candidate in the plant, fitted and validated.
 
-    size    strength and forms with standard deviations, by full parameter name
+    size                strength and forms with standard deviations, by full parameter name
+    drop_train          share of the misfit beyond noise that goes away, and
+    drop_validation     the same on held-out recordings, where no window counts too much
+    plain_validation    held-out squared error over that of the base, nothing capped
     """
 
     candidate: Candidate
@@ -44,6 +48,7 @@ class Refit:
     size: dict[str, Size]
     drop_train: float
     drop_validation: float
+    plain_validation: float
 
 
 def refit(problem: Problem, profile: Profile) -> Refit:
@@ -67,15 +72,7 @@ def refit(problem: Problem, profile: Profile) -> Refit:
         starts = carried(problem.base.point.starts, problem.base.windows, windows)
         absent = Point(unknowns.clipped(unknowns.scaled(values)), starts)
         fit = fit_windows(windows, unknowns, absent, ITERATIONS)
-    validation = problem.validated(fit)
-    return Refit(
-        candidate=candidate,
-        fit=fit,
-        validation=validation,
-        size=sizes(fit, (candidate.strength, *candidate.forms)),
-        drop_train=_drop(problem.base, fit),
-        drop_validation=held_out_drop(problem.base_validation, validation),
-    )
+    return _refit(problem, candidate, fit, (candidate.strength, *candidate.forms))
 
 
 def _with_shape(problem: Problem, unknowns: Unknowns, profile: Profile) -> Unknowns:
@@ -102,14 +99,20 @@ def refit_shift(problem: Problem, shift: Shift) -> Refit:
     precision[row] *= WIDE**-2
     unknowns = replace(base.unknowns, precision=precision)
     fit = fit_windows(base.windows, unknowns, base.point, ITERATIONS, problem.linearised)
-    validation = problem.validated(fit)
+    return _refit(problem, shift.candidate, fit, (shift.name,))
+
+
+def _refit(problem: Problem, candidate: Candidate, fit: Fit, names: tuple[str, ...]) -> Refit:
+    """A fit with a candidate, validated and measured against the base."""
+    before, validation = problem.base_validation, problem.validated(fit)
     return Refit(
-        candidate=shift.candidate,
+        candidate=candidate,
         fit=fit,
         validation=validation,
-        size=sizes(fit, (shift.name,)),
-        drop_train=_drop(base, fit),
-        drop_validation=held_out_drop(problem.base_validation, validation),
+        size=sizes(fit, names),
+        drop_train=_drop(problem.base, fit),
+        drop_validation=held_out_drop(before, validation),
+        plain_validation=per_sample(validation) / per_sample(before),
     )
 
 

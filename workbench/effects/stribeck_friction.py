@@ -50,10 +50,11 @@ class StribeckFriction(Effect):
         Cause(
             name="stiction",
             strength="stiction_excess_n",
+            needs="coulomb_force_n",
             balance=Balance.MOMENTUM,
             drivers=("speed near zero",),
             kinked=True,
-            shapes={"stribeck_velocity_m_s": (0.01, 0.024, 0.06)},
+            shapes={"stribeck_velocity_m_s": (0.0025, 0.008, 0.024)},  # 000, between, 002
             shown_by="slow ramps from rest, both directions",
             source="paper 002 Eq. 13, table 5; 000 Eq. 11",
         ),

@@ -111,7 +111,7 @@ class DeadZone(Effect):
     distance from that to full command, so that full command is full opening for every half-width
     w.  A band beside the valve's centre is an offset of the command; it fades with the band.
 
-    Source: paper 002 Fig. 5 and Table 3 (zms 4.53 V, zmd 5.37 V); the rescaling is the convention
+    Source: paper 002 Fig. 11 and Table 3 (zms 4.53 V, zmd 5.37 V); the rescaling is the convention
     of physics.md 2.4.
     """
 
@@ -123,7 +123,7 @@ class DeadZone(Effect):
             drivers=("command near centre",),
             kinked=True,
             shown_by="slow voltage ramp through the centre",
-            source="paper 002 Fig. 5, Table 3",
+            source="paper 002 Fig. 11, Table 3",
         ),
     )
 

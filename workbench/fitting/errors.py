@@ -41,6 +41,15 @@ def signal_errors(fit: Fit) -> dict[str, SignalError]:
     return found
 
 
+def per_sample(fit: Fit | None) -> float:
+    """Mean squared error in noise deviations, nothing capped; NaN without a fit."""
+    if fit is None:
+        return float("nan")
+    windows = fit.windows
+    error = fit.residual * windows.scale[:, :, None] / windows.noise[:, None, None]
+    return float((error**2).sum() / windows.count)
+
+
 def errors_of(train: Fit, validation: Fit | None) -> Errors:
     """Errors in units of a fit and of its validation."""
     found = {"train": signal_errors(train)}

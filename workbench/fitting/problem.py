@@ -10,12 +10,12 @@ from workbench.fitting.linearised import Linearised, Point
 from workbench.fitting.noise import measured_noise
 from workbench.fitting.start_states import refit_starts
 from workbench.fitting.unknowns import Unknowns, nominal_unknowns
-from workbench.fitting.windows import MOST_WINDOWS, WINDOW_S, cut_windows
+from workbench.fitting.windows import MOST_WINDOWS, WINDOW_S, cut_windows, position_alone
 from workbench.plant import Candidate, Plant
 from workbench.recording import Recording
 from workbench.rig import Rig
 
-LONGEST_WINDOW_S = 0.4
+LONGEST_WINDOW_S = 0.8
 FIRST_ITERATIONS = 3  # with scales from the model as it came
 ITERATIONS = 12  # with scales from the first fit
 LEAST_HELD_OUT_WINDOWS = 24
@@ -146,8 +146,7 @@ def window_length_s(plant: Plant, recordings: Sequence[Recording]) -> float:
 
     A position alone says little of flows and forces in a fifth of a second.
     """
-    alone = all(name.endswith(("position_m", "angle_rad")) for name in plant.measured)
-    if not (alone and plant.state_list):
+    if not position_alone(plant):
         return WINDOW_S
     shortest = min(len(piece) for r in recordings for piece in r.pieces)
     return min(shortest * recordings[0].sample_time_s, LONGEST_WINDOW_S)

@@ -109,13 +109,19 @@ class Windows:
 
     @cached_property
     def activity(self) -> np.ndarray:
-        """Standard deviation of each output within each window beyond noise, (n_y, n_windows)."""
+        """Standard deviation of each output within each window beyond noise, (n_y, n_windows).
+
+        The same for all windows where positions alone are recorded: there is no quiet pressure in
+        which a leak would show, and slow creeping is not to be weighed above full strokes.
+        """
         recorded = np.isfinite(self.measured)
         count = np.maximum(recorded.sum(axis=2), 1)
         values = np.where(recorded, self.measured, 0.0)
         mean = values.sum(axis=2) / count
         spread = np.where(recorded, self.measured - mean[:, :, None], 0.0)
         variance = (spread**2).sum(axis=2) / count
+        if position_alone(self.plant):
+            variance = np.broadcast_to(variance.mean(axis=1, keepdims=True), variance.shape)
         return np.sqrt(np.maximum(variance - self.noise[:, None] ** 2, 0.0))
 
     def scaled_like(self, other: Windows) -> Windows:
@@ -179,6 +185,12 @@ class Windows:
         effects = tuple(effect for effect in self.plant.effects if not _in_time(effect))
         plain = replace(self.plant, effects=effects)
         return cut_inputs(plain, self.recordings, self.firsts, self.length)
+
+
+def position_alone(plant: Plant) -> bool:
+    """True for a plant that moves, of which nothing but positions is recorded."""
+    ends = ("position_m", "angle_rad")
+    return bool(plant.state_list) and all(name.endswith(ends) for name in plant.measured)
 
 
 def _in_time(effect: Effect) -> bool:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from workbench.errors import Message
+from workbench.errors import InputError, Message, listed
 from workbench.plant import Plant
 from workbench.reading.table import RecordingWarning
+from workbench.recording import Recording
+from workbench.rig import Rig
 from workbench.units import display_unit, public_name, scale, si_unit, suffix
 
 LIMITS = {
@@ -97,3 +99,23 @@ def _longest_run(same: np.ndarray) -> tuple[int, int]:
         return 0, 0
     longest = int(np.argmax(last - first))
     return int(last[longest] - first[longest]), int(first[longest])
+
+
+def enough_samples(rig: Rig, recordings: Sequence[Recording], only: Sequence[str] = ()) -> None:
+    """Refuse to fit more parameters than there are samples: those named, or all that are free.
+
+    Raises
+    ------
+    InputError
+        Naming the recordings, with both numbers.
+    """
+    free = only or [
+        name
+        for name in rig.plant.values
+        if rig.standard_deviation(name) > 0.0 and name not in rig.fixed
+    ]
+    samples = sum(map(len, recordings))
+    if samples < len(free):
+        what = f"{samples} samples are fewer than the {len(free)} parameters of {rig.plant.name}"
+        sources = listed(each.source or each.name for each in recordings)
+        raise InputError(Message(what, expected="a longer recording to fit", file=sources))

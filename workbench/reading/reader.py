@@ -63,7 +63,7 @@ def _recording(rig: Rig, path: Path, channels: dict[str, np.ndarray], grid: Grid
         for name, channel in rig.reader.channels.items()
         if channel.noise is not None and name in channels
     }
-    found = Recording(
+    return Recording(
         name=path.stem,
         sample_time_s=grid.sample_time_s,
         channels=channels,
@@ -71,11 +71,6 @@ def _recording(rig: Rig, path: Path, channels: dict[str, np.ndarray], grid: Grid
         starts=grid.starts,
         source=str(path),
     )
-    free = [n for n in rig.plant.values if rig.standard_deviation(n) > 0 and n not in rig.fixed]
-    if len(found) < len(free):
-        what = f"{len(found)} samples are fewer than the {len(free)} parameters of {rig.plant.name}"
-        raise InputError(Message(what, file=str(path)))
-    return found
 
 
 def _columns(rig: Rig, table: Table) -> dict[str, int]:

@@ -31,6 +31,12 @@ def rig(seal: str) -> Rig:
     return replace(bench, name=f"printed cylinder, {seal}", plant=plant)
 
 
+def everything(folder: Path) -> list[tuple[Rig, Recording]]:
+    """Every recording, with its bench."""
+    levels_bar = sorted(TRAIN_BAR + HELD_OUT_BAR)
+    return [(rig(s), each) for s in SEALS for each in recordings(folder, s, tuple(levels_bar))]
+
+
 def recordings(folder: Path, seal: str, levels_bar: tuple[int, ...]) -> list[Recording]:
     """The recordings of one seal at these pressures."""
     bench, place = rig(seal), folder / "printed_cylinder"

@@ -30,6 +30,11 @@ def rig() -> Rig:
     return load_rig(RIG)
 
 
+def everything(folder: Path) -> list[tuple[Rig, Recording]]:
+    """Every kick, with the cylinder."""
+    return [(rig(), kick) for kick in kicks(folder)]
+
+
 def kicks(folder: Path) -> list[Recording]:
     """The kicks, each with its own start: ``TRAIN`` for fitting, ``TEST`` for validation."""
     whole = read_recording(rig(), folder / FILE)

@@ -1,0 +1,94 @@
+"""Specifications: frozen dataclasses of numbers, each with the range in which it makes sense.
+
+A number is finite and above zero unless its field says otherwise by :func:`ranged`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import Field, dataclass, field, fields, is_dataclass
+from math import inf, isfinite
+from typing import Any
+
+from workbench.errors import InputError, Message, listed, nearest
+
+
+@dataclass(frozen=True)
+class Range:
+    """From ``least`` to ``most``, both included; or from just above ``least``."""
+
+    least: float = 0.0
+    most: float = inf
+    above: bool = True
+
+    def holds(self, value: float) -> bool:
+        """True when a finite value lies inside."""
+        bottom = value > self.least if self.above else value >= self.least
+        return isfinite(value) and bottom and value <= self.most
+
+    def __str__(self) -> str:
+        bottom = f"above {self.least:g}" if self.above else f"from {self.least:g}"
+        return bottom + (f" to {self.most:g}" if self.most < inf else "")
+
+
+def ranged(default: float, *, least: float = 0.0, most: float = inf, above: bool = False) -> Any:
+    """A number of a specification with a range of its own."""
+    return field(default=default, metadata={"range": Range(least, most, above)})
+
+
+def replaced(spec: Any, numbers: object, where: str) -> Any:
+    """The specification with some numbers replaced, tables inside it likewise.
+
+    Raises
+    ------
+    InputError
+        Naming every number that is unknown, of the wrong type or out of its range.
+    """
+    found, wrong = _replaced(spec, numbers, where)
+    if wrong:
+        raise InputError(*wrong)
+    return found
+
+
+def _replaced(spec: Any, numbers: object, where: str) -> tuple[Any, list[Message]]:
+    known = {f.name: f for f in fields(spec)}
+    if not isinstance(numbers, Mapping):
+        expected = f"a table of some of {listed(known)}"
+        return spec, [Message(f"{where} is {numbers!r}", expected=expected)]
+    values = {name: getattr(spec, name) for name in known}
+    wrong: list[Message] = []
+    for key, value in numbers.items():
+        inside = f"{where}.{key}"
+        if key not in known:
+            wrong.append(_unknown(spec, key, where))
+        elif is_dataclass(values[key]):
+            values[key], more = _replaced(values[key], value, inside)
+            wrong += more
+        elif expected := _refused(known[key], values[key], value):
+            wrong.append(Message(f"{inside} is {value!r}", expected=expected))
+        else:
+            values[key] = type(values[key])(value)
+    return (spec if wrong else type(spec)(**values)), wrong
+
+
+def _refused(known: Field, default: float, value: object) -> str:
+    """What was expected in place of this value; empty where it is right."""
+    whole = isinstance(default, int)
+    inside = known.metadata.get("range", Range())
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    if number and inside.holds(value) and (not whole or value == round(value)):
+        return ""
+    return f"a {'whole ' if whole else ''}number {inside}"
+
+
+def _unknown(spec: Any, key: str, where: str) -> Message:
+    """A key that is not there, with the nearest one, also of the tables inside."""
+    names = [f.name for f in fields(spec)]
+    deeper = {
+        f.name: f"{name}.{f.name}"
+        for name in names
+        if is_dataclass(getattr(spec, name))
+        for f in fields(getattr(spec, name))
+    }
+    near = nearest(key, names) or deeper.get(nearest(key, deeper), "")
+    return Message(f"{where} has no {key}", expected=f"one of {listed(names)}", nearest=near)

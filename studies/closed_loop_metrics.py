@@ -1,0 +1,175 @@
+"""What a closed-loop run is judged by: metrics of a record, and their table."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from math import inf, isnan, nan
+
+import numpy as np
+
+from linearize.standard import POSITION, PRESSURES, SUPPLY, stroke_m
+from studies.scenarios import LATE_S, SAMPLE_TIME_S, Scenario
+from workbench.closed_loop import LoopRecord
+from workbench.plant import Plant
+
+SETTLED_M, GOAL_CYCLE_M = 0.2e-3, 0.1e-3
+LOST_SHARE = 0.1  # of the amplitude: a reference that is followed worse than this is lost
+MARGIN_M, LOWEST_PA, BELOW_SUPPLY_PA = 2e-3, 1.2e5, 5e3
+
+
+@dataclass(frozen=True)
+class Metrics:
+    """One row of the table; what makes no sense for a scenario is NaN.
+
+    Attributes
+    ----------
+    rise_s, settling_s
+        From 10 to 90 % of the step; from the step until the error stays below 0.2 mm.
+    overshoot_m, final_error_m, limit_cycle_m
+        Past the target; largest error and peak-to-peak motion over the last 0.4 s.
+    rmse_m
+        Root of the mean squared error once tracking is judged.
+    air_kg
+        Taken from the supply.
+    activity_v
+        Sum of all changes of the command.
+    violation_s
+        Time outside the limits of position and pressures.
+    amplitude_m
+        Of a reference that does not end at rest; NaN for one that does.
+    solve_median_s, solve_p99_s
+        Wall time of one controller step.
+    """
+
+    design: str
+    estimator: str
+    scenario: str
+    rise_s: float
+    overshoot_m: float
+    settling_s: float
+    final_error_m: float
+    limit_cycle_m: float
+    rmse_m: float
+    air_kg: float
+    activity_v: float
+    violation_s: float
+    solve_median_s: float
+    solve_p99_s: float
+    estimate_median_s: float
+    amplitude_m: float = nan
+
+    @property
+    def ends_at_rest(self) -> bool:
+        """True where the reference stands still at the end."""
+        return isnan(self.amplitude_m)
+
+    @property
+    def reached(self) -> bool | None:
+        """True when a step ends within 0.2 mm without a limit cycle above 0.1 mm.
+
+        A reference that does not end at rest has no such goal: None, or False where it is lost.
+        """
+        if self.ends_at_rest:
+            return self.final_error_m < SETTLED_M and self.limit_cycle_m < GOAL_CYCLE_M
+        followed = self.rmse_m <= LOST_SHARE * self.amplitude_m
+        return None if followed else False
+
+
+def measure(
+    plant: Plant, record: LoopRecord, scenario: Scenario, design: str, estimator: str
+) -> Metrics:
+    """The metrics of one run."""
+    recording, wanted = record.recording, scenario.reference_m
+    position, error = recording[POSITION], recording[POSITION] - wanted
+    command = recording.rows(plant.model.commands)
+    judged = error[round(scenario.judged_s / SAMPLE_TIME_S) :]
+    return Metrics(
+        design=design,
+        estimator=estimator,
+        scenario=scenario.name,
+        **_step_metrics(position, wanted, scenario),
+        rmse_m=float(np.sqrt(np.mean(judged**2))),
+        air_kg=air_used_kg(plant, record),
+        activity_v=float(np.abs(np.diff(command)).sum()),
+        violation_s=_violation_s(plant, record),
+        solve_median_s=float(np.median(record.control_time_s)),
+        solve_p99_s=float(np.percentile(record.control_time_s, 99)),
+        estimate_median_s=float(np.median(record.estimate_time_s)),
+        amplitude_m=nan if scenario.ends_at_rest else float(np.ptp(wanted) / 2.0),
+    )
+
+
+def _step_metrics(position: np.ndarray, wanted: np.ndarray, scenario: Scenario) -> dict[str, float]:
+    """Those of a step; NaN where the reference does not end at rest."""
+    late = round(LATE_S / SAMPLE_TIME_S)
+    if not scenario.ends_at_rest:
+        return dict.fromkeys(
+            ("rise_s", "overshoot_m", "settling_s", "final_error_m", "limit_cycle_m"), np.nan
+        )
+    begins, size = round(scenario.begins_s / SAMPLE_TIME_S), wanted[-1] - wanted[0]
+    share, error = (position - wanted[0]) / size, position - wanted
+    outside = np.flatnonzero(np.abs(error) > SETTLED_M)
+    settled = outside[-1] + 1 if len(outside) else begins
+    rose = share.max() > 0.9
+    return {
+        "rise_s": float(np.argmax(share > 0.9) - np.argmax(share > 0.1)) * SAMPLE_TIME_S
+        if rose
+        else np.nan,
+        "overshoot_m": float(max(share.max() - 1.0, 0.0) * abs(size)),
+        "settling_s": (settled - begins) * SAMPLE_TIME_S if settled < len(error) else inf,
+        "final_error_m": float(np.abs(error[-late:]).max()),
+        "limit_cycle_m": float(np.ptp(position[-late:])),
+    }
+
+
+def air_used_kg(plant: Plant, record: LoopRecord) -> float:
+    """Air taken from the supply: the flows that leave its balance, summed over the run."""
+    import casadi as ca
+
+    model, (_, d, p) = plant.model, plant.nominal
+    leaving = sum(
+        flow for (_, kind, at), flow in model.flows.items() if kind == "MassFlow" and at == "supply"
+    )
+    taken = ca.Function("taken", [*model.symbols], [-leaving])
+    u, x = record.recording.rows(model.commands), record.recording.rows(model.states)
+    return float(taken.map(x.shape[1])(x, u, d, p).full().sum() * SAMPLE_TIME_S)
+
+
+def _violation_s(plant: Plant, record: LoopRecord) -> float:
+    position, pressures = record.recording[POSITION], record.recording.rows(PRESSURES)
+    highest_pa = plant.values[SUPPLY] - BELOW_SUPPLY_PA
+    outside = (position < MARGIN_M) | (position > stroke_m(plant) - MARGIN_M)
+    outside |= ((pressures < LOWEST_PA) | (pressures > highest_pa)).any(axis=0)
+    return float(outside.sum() * SAMPLE_TIME_S)
+
+
+LABELS = ("design", "estimator", "scenario")
+ANSWERS = {True: "yes", False: "no", None: "-"}
+COLUMNS = {
+    "rise_s": ("rise ms", 1e3),
+    "overshoot_m": ("over mm", 1e3),
+    "settling_s": ("settle ms", 1e3),
+    "final_error_m": ("final mm", 1e3),
+    "limit_cycle_m": ("cycle mm", 1e3),
+    "rmse_m": ("RMSE mm", 1e3),
+    "air_kg": ("air g", 1e3),
+    "activity_v": ("moves V", 1.0),
+    "violation_s": ("limits ms", 1e3),
+    "solve_median_s": ("ctrl us", 1e6),
+    "solve_p99_s": ("p99 us", 1e6),
+    "estimate_median_s": ("est us", 1e6),
+}
+
+
+def table(rows: Iterable[Metrics]) -> str:
+    """The rows as text, one line each, in millimetres, milliseconds, grams and microseconds."""
+    head = [*LABELS, "reached", *(label for label, _ in COLUMNS.values())]
+    lines = ["".join(f"{label:>10}" for label in head)]
+    for row in rows:
+        words = [f"{getattr(row, label):>10}" for label in LABELS]
+        words.append(f"{ANSWERS[row.reached]:>10}")
+        values = [(getattr(row, key) * factor) for key, (_, factor) in COLUMNS.items()]
+        words += [f"{'-' if np.isnan(value) else format(value, '.4g'):>10}" for value in values]
+        lines.append("".join(words))
+    return "\n".join(lines)

@@ -1,0 +1,114 @@
+"""Files of a command: what it may write, recordings it reads, JSON it writes."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from workbench.recording import Recording
+
+
+def writable(*files: Path | None, folders: Iterable[Path | None] = ()) -> None:
+    """Refuse, before any work, a file or a folder that could not be written in the end.
+
+    Raises
+    ------
+    InputError
+        Naming all of them.
+    """
+    from workbench.errors import InputError, Message
+
+    wrong = []
+    for path in filter(None, files):
+        if path.is_dir():
+            wrong.append(Message("is a folder", str(path), "the name of a file to write"))
+        else:
+            wrong += _no_folder(path, path.parent)
+    for path in filter(None, folders):
+        wrong += _no_folder(path, path)
+    if wrong:
+        raise InputError(*wrong)
+
+
+def _no_folder(path: Path, folder: Path) -> list[Any]:
+    """What stands in the way of writing into a folder, which need not be there yet."""
+    from workbench.errors import Message
+
+    nearest = next(place for place in (folder, *folder.absolute().parents) if place.exists())
+    if not nearest.is_dir():
+        what = "is a file" if nearest == path else f"cannot be written: {nearest} is a file"
+        return [Message(what, str(path), "a folder to write into")]
+    if not os.access(nearest, os.W_OK | os.X_OK):
+        return [Message(f"cannot be written: {nearest} is read-only", str(path))]
+    return []
+
+
+def write_json(path: Path | None, document: dict[str, Any]) -> None:
+    """Write a document, if a file is wanted."""
+    if path is None:
+        return
+    import json
+
+    from workbench.errors import whole_file
+
+    with whole_file(path) as unfinished:
+        text = json.dumps(document, indent=2, allow_nan=False)
+        unfinished.write_text(text + "\n", encoding="utf-8")
+
+
+def read_all(rig: Any, paths: list[Path] | None, say: Callable[[str], None]) -> list[Recording]:
+    """All recordings of a rig, each with a name of its own; all that is wrong is said at once.
+
+    Raises
+    ------
+    InputError
+        With the messages of all recordings.
+    """
+    from workbench.errors import InputError
+    from workbench.reading import read_recording
+
+    found, wrong = [], []
+    for path in paths or ():
+        say(f"reading {path}")
+        try:
+            found.append(read_recording(rig, path))
+        except InputError as error:
+            wrong += error.messages
+    if wrong:
+        raise InputError(*wrong)
+    return with_own_names(found)
+
+
+def read_to_fit(
+    rig: Any, paths: list[Path], say: Callable[[str], None], only: tuple[str, ...] = ()
+) -> list[Recording]:
+    """Recordings with samples enough for the parameters that are to be fitted to them."""
+    from workbench.reading import enough_samples
+
+    found = read_all(rig, paths, say)
+    enough_samples(rig, found, only)
+    return found
+
+
+def with_own_names(recordings: list[Recording]) -> list[Recording]:
+    """The same recordings; of files of one name the folder tells them apart, else a number.
+
+    Figures are named after recordings, with ``_`` for a space.
+    """
+    names = [each.name for each in recordings]
+    folders = [Path(each.source).absolute().parent.name for each in recordings]
+    pairs = [*zip(folders, names, strict=True)]
+    names = [f"{a} {b}" if c else b for (a, b), c in zip(pairs, _repeated(names), strict=True)]
+    again = _repeated(names)
+    names = [f"{name} {k}" if again[k - 1] else name for k, name in enumerate(names, start=1)]
+    return [replace(each, name=name) for each, name in zip(recordings, names, strict=True)]
+
+
+def _repeated(names: list[str]) -> list[bool]:
+    """Which names stand for the same file name as another."""
+    files = [name.replace(" ", "_").casefold() for name in names]
+    return [files.count(name) > 1 for name in files]

@@ -1,0 +1,180 @@
+"""`design` and `check`: what they refuse, what they warn of, and what the answer depends on."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from commands import call
+
+from controllers.condensed import MpcSpec, limits_of
+from linearize.standard import stroke_m
+from studies.checking import differences
+from studies.closed_loop_check import Check
+from studies.closed_loop_metrics import LOST_SHARE, Metrics, table
+from studies.documents import check_document
+from workbench.plants import PLANTS
+
+PLANT = PLANTS["servo_drive"]()
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory):
+    """Rig files of several plants, and a design for the servo drive in a folder of its own."""
+    folder = tmp_path_factory.mktemp("control")
+    for plant in PLANTS:
+        (folder / f"{plant}.toml").write_text(f'plant = "{plant}"\n')
+    answer = call(
+        "design", folder / "servo_drive.toml", "--controller", "pid",
+        "-o", folder / "new" / "folder" / "pid.toml",
+    )  # fmt: skip
+    assert answer.exit_code == 0, answer.output
+    return folder
+
+
+def row(scenario, error_m, cycle_m, rmse_m, amplitude_m):
+    """Metrics of a run with these errors."""
+    rest = dict.fromkeys(
+        ("rise_s", "overshoot_m", "settling_s", "air_kg", "activity_v", "violation_s",
+         "solve_median_s", "solve_p99_s", "estimate_median_s"), 0.0,
+    )  # fmt: skip
+    errors = {"final_error_m": error_m, "limit_cycle_m": cycle_m, "rmse_m": rmse_m}
+    return Metrics("lq", "ekf", scenario, **errors, amplitude_m=amplitude_m, **rest)
+
+
+NONE = float("nan")
+GOOD, FAR = row("step", 1e-4, 1e-5, 2e-2, NONE), row("step", 5e-4, 1e-5, 2e-2, NONE)
+FOLLOWED = row("sine", NONE, NONE, 3e-4, 0.08)
+LOST = replace(FOLLOWED, rmse_m=1.1 * LOST_SHARE * 0.08)
+
+
+def test_a_design_goes_into_a_folder_that_is_made_for_it(place):
+    assert [path.name for path in (place / "new" / "folder").iterdir()] == ["pid.toml"]
+
+
+@pytest.mark.parametrize("plant", ["vertical_cylinder", "cylinder_bench"])
+def test_a_plant_without_standard_modes_is_refused_in_one_line(place, plant):
+    answer = call("check", place / f"{plant}.toml", place / "new" / "folder" / "pid.toml")
+
+    assert answer.exit_code == 2
+    assert f"{plant} has no standard modes" in answer.stderr
+    assert len(answer.stderr.splitlines()) == 1
+
+
+def test_a_design_for_another_plant_is_refused(place, monkeypatch):
+    from studies import checking
+
+    found = checking.read_design(place / "new" / "folder" / "pid.toml")
+    other = replace(found, plant=replace(found.plant, name="crr_rig"))
+    monkeypatch.setattr(checking, "read_design", lambda path: other)
+
+    answer = call("check", place / "servo_drive.toml", place / "new" / "folder" / "pid.toml")
+
+    assert answer.exit_code == 2
+    assert "is a design for crr_rig; expected one for servo_drive" in answer.stderr
+
+
+@pytest.mark.parametrize(
+    ("spec", "said"),
+    [
+        ("positioning = 3", "mpc.positioning is 3; expected a table of some of approach_m"),
+        ("horizon = 0", "mpc.horizon is 0; expected a whole number from 1 to 500"),
+        ("horizon = 2.5", "mpc.horizon is 2.5; expected a whole number"),
+        ("opening_v = nan", "mpc.opening_v is nan; expected a number above 0"),
+        ("sample_time_s = -1", "mpc.sample_time_s is -1; expected a number above 0"),
+        ("[positioning]\nstribeck_share = 2", "expected a number from 0 to 1"),
+        ("positon_m = 1", "did you mean 'position_m'?"),
+        ("band_m = 1e-4", "did you mean 'positioning.band_m'?"),
+        ("below_supply_pa = 6e5", "leave no room on servo_drive"),
+    ],
+)
+def test_a_number_that_makes_no_sense_is_named_with_what_was_expected(place, tmp_path, spec, said):
+    path = tmp_path / "spec.toml"
+    path.write_text(spec + "\n")
+
+    answer = call(
+        "design", place / "servo_drive.toml", "--controller", "mpc", "--spec", path,
+        "-o", tmp_path / "mpc.toml",
+    )  # fmt: skip
+
+    assert answer.exit_code == 2
+    assert said in answer.stderr
+    assert [p.name for p in tmp_path.iterdir()] == ["spec.toml"]
+
+
+def test_only_a_reference_that_ends_at_rest_has_a_goal_and_any_can_be_lost():
+    assert [each.reached for each in (GOOD, FAR, FOLLOWED, LOST)] == [True, False, None, False]
+
+    document = check_document("drive", Check((GOOD, FOLLOWED), ()))
+    assert [run["reached"] for run in document["runs"]] == [True, None]
+    lines = table((GOOD, FAR, FOLLOWED)).splitlines()
+    assert [line.split()[3] for line in lines] == ["reached", "yes", "no", "-"]
+
+
+def test_a_diverged_run_has_not_reached_anything():
+    assert row("step", NONE, NONE, NONE, NONE).reached is False
+    assert replace(FOLLOWED, rmse_m=NONE).reached is False
+
+
+@pytest.mark.parametrize(("rows", "code"), [((GOOD, FOLLOWED), 0), ((GOOD, FAR), 1), ((LOST,), 1)])
+def test_the_exit_code_depends_on_rows_with_a_goal(place, monkeypatch, rows, code):
+    from studies import checking
+
+    monkeypatch.setattr(checking, "check_rig", lambda *_: Check(rows, ()))
+
+    assert call("check", place / "servo_drive.toml", "pid.toml").exit_code == code
+
+
+def test_other_values_than_those_of_the_design_are_named_five_of_them():
+    changed = {name: 1.01 * value for name, value in PLANT.values.items() if value > 0.0}
+    few = dict([*changed.items()][:2])
+
+    assert differences(PLANT, PLANT) == []
+    assert len(differences(PLANT, PLANT.with_values(few))) == 2
+    assert "slide.mass 2.22 kg (here 2.3 kg)" in differences(
+        PLANT, PLANT.with_values({"slide.mass_kg": 2.3})
+    )
+
+
+def test_a_check_warns_once_of_a_design_for_other_values(place, monkeypatch, tmp_path):
+    from studies import checking
+
+    values = [
+        '"slide.mass" = "2.3 kg"', '"supply.pressure" = "6.5 bar"',
+        '"friction.viscous" = "50 N s/m"', '"chamber_a.dead_volume" = "40 cm^3"',
+        '"chamber_b.dead_volume" = "40 cm^3"', '"friction.coulomb_force" = "20 N"',
+    ]  # fmt: skip
+    rig = tmp_path / "rig.toml"
+    rig.write_text('plant = "servo_drive"\n[values]\n' + "\n".join(values) + "\n")
+    monkeypatch.setattr(checking, "check", lambda *_, **__: Check((GOOD,), ()))
+
+    answer = call("check", rig, place / "new" / "folder" / "pid.toml", "-q")
+
+    assert answer.exit_code == 0, answer.output
+    assert len(answer.stderr.splitlines()) == 1
+    assert "pid.toml: designed for other values than those of rig: " in answer.stderr
+    assert "and 1 more" in answer.stderr
+
+
+def test_limits_of_the_pressures_follow_the_supply():
+    low = PLANT.with_values({"supply.pressure_pa": 5e5})
+
+    assert limits_of(PLANT, MpcSpec())[1].tolist() == [stroke_m(PLANT) - 2e-3, 6.9e5, 6.9e5]
+    assert limits_of(low, MpcSpec())[1, 1:].tolist() == [4.9e5, 4.9e5]
+
+
+def test_time_outside_the_limits_is_counted_against_the_own_supply():
+    from studies.closed_loop_metrics import _violation_s
+    from workbench.closed_loop import LoopRecord
+    from workbench.recording import Recording
+
+    n = 10
+    channels = {
+        "slide.position_m": np.full(n, 0.1),
+        "chamber_a.pressure_pa": np.full(n, 6e5),
+        "chamber_b.pressure_pa": np.full(n, 6e5),
+    }
+    none = np.zeros((0, n))
+    record = LoopRecord(Recording("run", 1e-3, channels), none, {}, none, none, {})
+
+    assert _violation_s(PLANT, record) == 0.0
+    assert _violation_s(PLANT.with_values({"supply.pressure_pa": 6e5}), record) == n * 1e-3

@@ -1,0 +1,140 @@
+"""Margins of the sampled loop at the plant's input: known loops, and the loops of the designs."""
+
+from dataclasses import replace
+from math import inf, pi
+
+import numpy as np
+import pytest
+from commands import call
+
+from controllers import CONTROLLERS
+from controllers.margins import Law, loop, margins, margins_of
+from controllers.positioning import STATES
+from controllers.scheduled import driven_modes
+from linearize.discrete import sampled
+from linearize.standard import standard_modes
+from studies.design_text import margins_text
+from workbench.contracts import Estimate
+from workbench.plants.servo_drive import servo_drive
+
+DT = 2e-3
+everyone = pytest.mark.parametrize("name", CONTROLLERS)
+
+
+@pytest.fixture(scope="module")
+def hybrid():
+    return standard_modes(servo_drive())
+
+
+@pytest.fixture(scope="module")
+def controllers(hybrid):
+    return {name: m.design(hybrid, m.spec()) for name, m in CONTROLLERS.items()}
+
+
+def proportional(gain):
+    """U = -gain * position, without memory."""
+    return Law(np.zeros((0, 0)), np.zeros((0, 4)), np.zeros(0), np.array([-gain, 0.0, 0.0, 0.0]))
+
+
+def integrator(hybrid):
+    """A mode whose position is the integral of its opening."""
+    mode = driven_modes(hybrid)[0][1]
+    A, B = np.diag([0.0, -1.0, -1.0, -1.0]), np.array([[1.0], [0.0], [0.0], [0.0]])
+    return replace(mode, A=A, B=B, scale=np.ones(4), drift=np.zeros(4), state=np.zeros(4))
+
+
+def test_a_sampled_integrator_has_the_margins_of_the_textbook(hybrid):
+    """L = K T / (z - 1) has |L| = 1 at w T = 2 asin(K T / 2), and turns by -90 deg - w T / 2."""
+    K = 100.0
+    found = margins_of(integrator(hybrid), proportional(K), DT)
+    turn = 2.0 * np.arcsin(K * DT / 2.0)
+
+    assert found.stable
+    assert found.gain == (0.0, pytest.approx(2.0 / (K * DT), rel=1e-6))
+    assert found.phase_rad == pytest.approx(pi / 2.0 - turn / 2.0, rel=1e-4)
+    assert found.delay_s == pytest.approx((pi / 2.0 - turn / 2.0) / (turn / DT), rel=1e-4)
+
+
+def test_a_loop_beyond_its_gain_margin_is_called_unstable(hybrid):
+    found = margins_of(integrator(hybrid), proportional(1001.0), DT)
+
+    assert not found.stable
+    said = margins_text([found]).splitlines()
+    assert said[1].split()[-6:] == ["-"] * 5 + ["unstable"]
+    assert said[2].startswith("unstable: ")
+
+
+@everyone
+def test_the_law_is_what_the_controller_does_near_its_point(controllers, hybrid, name):
+    """Three samples of the controller itself, moved a little, against its linear law."""
+    controller = controllers[name]
+    law, place = controller.laws.forward[1], 0.145
+    base = np.array([place, 0.1, 5.9e5, 5.0e5])
+    moved = np.array([2e-5, 1e-3, 2e2, -1e2])
+
+    def openings(change):
+        command, found = controller.start(), []
+        for _ in range(3):
+            reference = place + 1e-3 + 0.1 * DT * np.arange(controller.preview)
+            command = controller.step(command, reference[None], Estimate(STATES, base + change, 0))
+            found.append(command.notes["opening_v"])
+        return np.array(found)
+
+    s, expected = np.zeros(len(law.A)), []
+    for _ in range(3):
+        expected.append(law.C @ s + law.D @ moved)
+        s = law.A @ s + law.B @ moved
+
+    assert openings(moved) - openings(0.0 * moved) == pytest.approx(expected, rel=0.05, abs=1e-4)
+
+
+@everyone
+def test_gain_margins_are_where_the_loop_changes_its_stability(controllers, hybrid, name):
+    controller = controllers[name]
+    modes = [mode for side in driven_modes(hybrid) for mode in side]
+    laws = controller.laws.forward + controller.laws.backward
+    for found, mode, law in zip(margins(hybrid, controller.laws, DT), modes, laws, strict=True):
+        A, B, C = loop(mode, law, DT)
+
+        def radius(gain, A=A, B=B, C=C):
+            return np.abs(np.linalg.eigvals(A - gain * B @ C)).max()
+
+        assert found.stable == (radius(1.0) < 1.0)
+        for end in {*found.gain} - {0.0, inf}:
+            assert radius(0.99 * end) < 1.0 < radius(1.01 * end)
+
+
+def test_lq_and_mpc_bear_half_the_gain_and_more_and_30_degrees(controllers, hybrid):
+    """PID does not: its fast pair grows with 7.6 1/s in the middle, and leans on dry friction."""
+    for name in ("lq", "mpc"):
+        for found in margins(hybrid, controllers[name].laws, DT):
+            assert found.stable
+            assert found.gain[0] < 0.5 and found.gain[1] > 2.0
+            assert found.phase_rad > pi / 6.0 and found.delay_s > DT
+            assert found.distance > 0.5
+    assert not any(found.stable for found in margins(hybrid, controllers["pid"].laws, DT))
+
+
+def test_the_loop_of_a_mode_is_the_sampled_mode_behind_its_law(hybrid):
+    mode = driven_modes(hybrid)[0][1]
+    A, B, C = loop(mode, proportional(2.0), DT)
+    small = sampled(mode, DT)
+
+    assert np.allclose(A * mode.scale[:, None] / mode.scale, small.F)
+    assert np.allclose(B[:, 0] * mode.scale, small.G[:, 0])
+    assert (C / mode.scale)[0] == pytest.approx([2.0, 0.0, 0.0, 0.0])
+
+
+@everyone
+def test_design_prints_margins_of_every_mode_and_that_nothing_is_certified(tmp_path, name):
+    rig = tmp_path / "rig.toml"
+    rig.write_text('plant = "servo_drive"\n')
+
+    answer = call("design", rig, "--controller", name, "-o", tmp_path / "design.toml", "-q")
+
+    assert answer.exit_code == 0, answer.output
+    lines = answer.stdout.splitlines()
+    head = next(k for k, line in enumerate(lines) if line.startswith("mode "))
+    assert all(word in lines[head] for word in ("gain up to", "phase deg", "delay ms", "distance"))
+    assert len({line.split("  ")[0] for line in lines[head + 1 : head + 7]}) == 6
+    assert "no certificate across modes" in answer.stdout

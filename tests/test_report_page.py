@@ -1,0 +1,86 @@
+"""The report: one page that needs no network, made again from its folder alone."""
+
+import re
+
+import pytest
+
+from studies.figures.style import new_figure, save, styled
+from studies.report import Section, render_folder, write_report
+from workbench.errors import InputError
+
+
+@pytest.fixture(scope="module")
+def figures():
+    """Two figures of a line each."""
+    found = {}
+    with styled():
+        for name in ("poles", "budget"):
+            found[name] = new_figure(3.5, 2.0)
+            found[name].subplots().plot([0, 1], [0, 1], label=name)
+    return found
+
+
+@pytest.fixture
+def page(figures, tmp_path):
+    for name in ("poles", "budget"):
+        save(figures[name], tmp_path / "figures" / name, "workbench demo")
+    sections = [
+        Section("Modes <&>", ("Some text.",), "a  b\n1  2", ("poles",)),
+        Section("Error", figures=("budget",)),
+    ]
+    return write_report(tmp_path, "From a recording", "workbench demo", sections)
+
+
+def test_a_page_holds_its_figures_and_needs_no_network(page):
+    text = page.read_text()
+
+    assert text.count("<svg") == 2
+    assert "Modes &lt;&amp;&gt;" in text and "1  2" in text
+    assert not re.search(r'(src|href)="(?!#)', text)
+    assert not re.search(r"@import|url\((?!#)|<metadata", text)
+
+
+def test_names_inside_a_page_are_its_own(page):
+    names = re.findall(r'\bid="([^"]+)"', page.read_text())
+    used = re.findall(r'href="#([^"]+)"|url\(#([^)]+)\)', page.read_text())
+
+    assert len(names) == len(set(names))
+    assert {a or b for a, b in used} <= set(names)
+
+
+def test_a_page_can_be_made_again_from_its_folder(page):
+    before = page.read_bytes()
+    page.unlink()
+
+    assert render_folder(page.parent).read_bytes() == before
+
+
+def test_a_folder_of_figures_alone_makes_a_page_too(figures, tmp_path):
+    save(figures["budget"], tmp_path / "budget", "workbench improve")
+
+    assert "<h2>1. budget</h2>" in render_folder(tmp_path).read_text()
+
+
+def test_a_caption_names_the_files_where_they_are_and_the_command(figures, page, tmp_path):
+    assert "figures/poles.pdf, figures/poles.svg, figures/poles.csv; " in page.read_text()
+
+    alone = tmp_path / "alone"
+    save(figures["budget"], alone / "budget", "workbench compare 'a b.csv'")
+    (alone / "budget.pdf").unlink()
+
+    assert (
+        "<figcaption>budget.svg, budget.csv; made by "
+        "<code>workbench compare &#39;a b.csv&#39;</code></figcaption>"
+    ) in render_folder(alone).read_text()
+
+
+def test_an_empty_folder_is_refused(tmp_path):
+    with pytest.raises(InputError, match="nothing to report"):
+        render_folder(tmp_path)
+
+
+def test_a_report_of_others_is_refused(tmp_path):
+    (tmp_path / "report.json").write_text('{"a": 1}')
+
+    with pytest.raises(InputError, match="no report of ours"):
+        render_folder(tmp_path)
