@@ -14,6 +14,7 @@ from gearbox_shifts import (
     shifted,
 )
 
+from workbench.closed_loop import Hardware
 from workbench.plants.gearbox import gearbox
 
 AMBIENT_PA = 1.013e5
@@ -234,3 +235,10 @@ def test_a_warm_seal_rubs_less_in_both_directions():
             accelerations.append(float(plant.model.f(x, [0, 0], [], p)[0][rate]))
 
         assert np.sign(velocity_m_s) * np.diff(accelerations) == pytest.approx(10.0)
+
+
+def test_a_switched_command_takes_the_nearest_of_its_levels():
+    sent = Hardware().sent(gearbox(), np.array([0.4, 0.6]))
+
+    np.testing.assert_array_equal(sent, [0.0, 1.0])
+    np.testing.assert_array_equal(Hardware().sent(gearbox(), np.array([-3.0, 7.0])), [0.0, 1.0])
