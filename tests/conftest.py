@@ -54,6 +54,8 @@ def _n(plant):
 
 def _values(signal, rng, n):
     """Values over the range of a signal, or around its nominal value where it has none."""
+    if signal.levels:
+        return rng.choice(signal.levels, n)
     if isfinite(signal.lower) and isfinite(signal.upper):
         return rng.uniform(signal.lower, signal.upper, n)
     size = 0.3 * abs(signal.nominal) or 0.1

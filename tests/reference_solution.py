@@ -3,7 +3,17 @@
 import numpy as np
 from scipy.integrate import Radau
 
-ABSOLUTE = {"m": 1e-9, "m_s": 1e-7, "rad": 1e-9, "rad_s": 1e-7, "pa": 0.1, "kg": 1e-11}
+from workbench.units import suffix
+
+ABSOLUTE = {
+    "m": 1e-9,
+    "m_s": 1e-7,
+    "rad": 1e-9,
+    "rad_s": 1e-7,
+    "pa": 0.1,
+    "kg": 1e-11,
+    "a": 1e-7,
+}
 BRISTLE_M = 1e-11
 
 
@@ -47,14 +57,14 @@ def _run(solver, states, first, last, sample_time_s):
 
 
 def _tolerances(model):
-    units = (name.rpartition(".")[2].partition("_")[2] for name in model.states)
-    values = [ABSOLUTE[unit] for unit in units]
-    bristle = ["deflection" in name for name in model.states]
-    return np.where(bristle, BRISTLE_M, values)
+    bristle = "deflection_m"
+    return np.array(
+        [BRISTLE_M if n.endswith(bristle) else ABSOLUTE[suffix(n)] for n in model.states]
+    )
 
 
 def _constant_pieces(command):
     """First and last sample of each stretch over which the command is held."""
-    changed = np.diff(command[:, :-1]).any(axis=0)
-    ends = [*(np.flatnonzero(changed) + 1), command.shape[1] - 1]
+    changes = np.diff(command[:, :-1]).any(axis=0)
+    ends = [*(np.flatnonzero(changes) + 1), command.shape[1] - 1]
     return zip([0, *ends[:-1]], ends, strict=True)

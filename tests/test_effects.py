@@ -20,6 +20,8 @@ DIMENSIONLESS = {
     "index",
     "ratio",
     "share",
+    "slope",
+    "turns",
     "weight",
 }
 SMALL_SHARE = 1e-3  # of the typical strength: the secant of a kinked cause

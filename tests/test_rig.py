@@ -91,7 +91,7 @@ def test_a_default_rig_is_the_plant_itself():
         ('colour = "red"', "rig:2: colour: a rig file has no such name"),
         ('[effects]\nadd = ["chamber_leek"]', "rig:3: chamber_leek: there is no such effect"),
         ('[effects]\nadd = ["chamber_leek"]', "did you mean 'chamber_leak'?"),
-        ('[effects]\nadd = ["detent@x"]', "there is no such effect"),
+        ('[effects]\nadd = ["snap@x"]', "there is no such effect"),
         ('[effects]\nadd = ["stiction"]\nremove = ["stiction"]', "rig:4: stiction: is named twice"),
         ('[values]\n"slide.mas" = "2 kg"', "did you mean 'slide.mass'?"),
         ('[values]\n"slide.mass" = "2 s"', "rig:3: slide.mass: unit 's' does not fit; expected kg"),

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from workbench.effect import Cause
 from workbench.effects import CATALOGUE
+from workbench.floating_piston import ControlChamber
 from workbench.parts import PARTS
 from workbench.plant import Plant
 
 
 def all_causes() -> dict[str, Cause]:
     """Causes by public name: those of the catalogue, and those that sit on parts (a mass)."""
-    return {cause.name: cause for kind in (*CATALOGUE, *PARTS) for cause in kind.causes}
+    kinds = (*CATALOGUE, *PARTS, ControlChamber)
+    return {cause.name: cause for kind in kinds for cause in kind.causes}
 
 
 def why_not(plant: Plant, name: str) -> str:

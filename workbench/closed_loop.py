@@ -15,7 +15,7 @@ import numpy as np
 
 from workbench.arrivals import Arrivals
 from workbench.contracts import Controller, Estimator
-from workbench.plant import Plant
+from workbench.plant import Plant, Signal
 from workbench.recording import Recording
 
 
@@ -47,11 +47,19 @@ class Hardware:
         return seen
 
     def sent(self, plant: Plant, command: np.ndarray) -> np.ndarray:
-        """What the valve gets of a command: within its range, on the converter's grid."""
-        lower = np.array([signal.lower for signal in plant.commands])
-        upper = np.array([signal.upper for signal in plant.commands])
-        step = (upper - lower) / (2**self.converter_bits - 1)
-        return lower + np.round((np.clip(command, lower, upper) - lower) / step) * step
+        """What the valves get of a command: within its range, on the converter's grid.
+
+        A switched command takes the nearest of its levels.
+        """
+        pairs = zip(plant.commands, command, strict=True)
+        return np.array([self._converted(signal, float(value)) for signal, value in pairs])
+
+    def _converted(self, signal: Signal, value: float) -> float:
+        if signal.levels:
+            return min(signal.levels, key=lambda level: abs(level - value))
+        step = (signal.upper - signal.lower) / (2**self.converter_bits - 1)
+        limited = np.clip(value, signal.lower, signal.upper)
+        return signal.lower + np.round((limited - signal.lower) / step) * step
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from math import pi
 from types import SimpleNamespace
 
 import casadi as ca
@@ -72,6 +73,8 @@ class Body(Part):
 
     (m + dm + sum of added masses) dv/dt = sum of forces
 
+    For the solvers: ``travel_m`` is a typical distance, ``step_error_m`` what one step may err.
+
     Source: paper 002 Eq. 9 and the like in 000, 001, 003.
     """
 
@@ -92,9 +95,11 @@ class Body(Part):
     added_mass_kg: Expression = strength(typical=1.0, lower=-1.0, upper=5.0)
 
     initial_position_m: float = 0.0
+    travel_m: float = 0.1
+    step_error_m: float = 2e-8
 
     def states(self) -> Iterator[State]:
-        yield State("position_m", self.initial_position_m, scale=0.1, tolerance=2e-8)
+        yield State("position_m", self.initial_position_m, self.travel_m, self.step_error_m)
         yield State("velocity_m_s", initial=0.0, scale=1.0, tolerance=2e-3)
 
     def guess(self, seen: Mapping[str, np.ndarray]) -> dict[str, tuple[np.ndarray | float, float]]:
@@ -154,7 +159,9 @@ class Chamber(Part):
 
     V dp/dt = kappa R sum(mdot T) - kappa p dV/dt + (kappa - 1) sum(Q)
     dm/dt   = sum(mdot),     T = p V / (m R)
-    V       = V_dead (1 + e) + A x   (side +1)   or   V_dead (1 + e) + A (L - x)   (side -1)
+    V       = V_dead (1 + e) + A l,   l = x - x_0 (side +1)   or   x_0 + L - x (side -1)
+
+    The stroke of length L begins at x_0.
 
     Source: paper 002 Eqs. 4 and 5 in the (p, m) form of physics.md 1.2 level 1, which conserves
     mass by construction; dead volume by erratum E002-8.
@@ -177,6 +184,7 @@ class Chamber(Part):
     side: int
     area_m2: Expression = form(1e-3, lower=1e-9)
     stroke_m: Expression = form(0.1, lower=1e-6)
+    lower_m: Expression = form(0.0, lower=-10.0, upper=10.0)
     dead_volume_m3: Expression = form(1e-5, lower=1e-9, relative_deviation=0.05)
     dead_volume_change: Expression = strength(typical=0.5, lower=-0.87, upper=2.0)
     gas_constant_j_kg_k: float = GAS_CONSTANT_J_KG_K
@@ -185,19 +193,34 @@ class Chamber(Part):
     initial_position_m: float = 0.0
 
     def states(self) -> Iterator[State]:
-        filled_kg = self.filled_mass_kg(self.initial_pressure_pa, self.initial_position_m)
+        filled_kg = self.filled_mass_kg(self.initial_pressure_pa, *self.initial_positions_m)
         yield State("pressure_pa", self.initial_pressure_pa, scale=1e5, tolerance=20.0)
         yield State("mass_kg", filled_kg, scale=1e-4, tolerance=1e-8)
 
-    def filled_mass_kg(self, pressure_pa: Expression, position_m: Expression) -> Expression:
-        """Mass of gas at a pressure and the initial temperature, the body at ``position_m``."""
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """What closes the chamber."""
+        return (self.body,)
+
+    @property
+    def initial_positions_m(self) -> tuple[float, ...]:
+        """Where the bodies are at the start."""
+        return (self.initial_position_m,)
+
+    def filled_mass_kg(self, pressure_pa: Expression, *positions_m: Expression) -> Expression:
+        """Mass of gas at a pressure and the initial temperature, the bodies at ``positions_m``."""
         gas_j_kg = self.gas_constant_j_kg_k * self.initial_temperature_k
-        return pressure_pa * self.volume_m3(position_m) / gas_j_kg
+        return pressure_pa * self.volume_m3(*positions_m) / gas_j_kg
+
+    def length_m(self, position_m: Expression) -> Expression:
+        """Length of the chamber with the body at ``position_m``."""
+        travel_m = position_m - self.lower_m
+        return travel_m if self.side > 0 else self.stroke_m - travel_m
 
     def volume_m3(self, position_m: Expression) -> Expression:
         """Gas volume with the body at ``position_m``."""
-        travel_m = position_m if self.side > 0 else self.stroke_m - position_m
-        return self.dead_volume_m3 * (1.0 + self.dead_volume_change) + self.area_m2 * travel_m
+        dead_m3 = self.dead_volume_m3 * (1.0 + self.dead_volume_change)
+        return dead_m3 + self.area_m2 * self.length_m(position_m)
 
     def temperature_k(self, own: SimpleNamespace, volume_m3: Expression) -> Expression:
         """T = p V / (m R), of the chamber's own states."""
@@ -212,10 +235,10 @@ class Chamber(Part):
 
     def guess(self, seen: Mapping[str, np.ndarray]) -> dict[str, tuple[np.ndarray | float, float]]:
         pressure_pa = seen.get(f"{self.name}.pressure_pa")
-        position_m = seen.get(f"{self.body}.position_m")
-        if pressure_pa is None or position_m is None:
+        positions_m = [seen.get(f"{body}.position_m") for body in self.bodies]
+        if pressure_pa is None or any(position_m is None for position_m in positions_m):
             return {}
-        filled_kg = self.filled_mass_kg(pressure_pa, position_m)
+        filled_kg = self.filled_mass_kg(pressure_pa, *positions_m)
         return {
             "pressure_pa": (pressure_pa, 2e3),
             "mass_kg": (filled_kg, 0.05 * float(np.median(filled_kg))),
@@ -223,15 +246,18 @@ class Chamber(Part):
 
     def derive(self, now: Conditions) -> dict[str, Expression]:
         own, body = now[self.name], now[self.body]
+        positions_m = (now[name].position_m for name in self.bodies)
         dead_m3 = self.dead_volume_m3 * (1.0 + self.dead_volume_change)
-        volume_m3 = ca.fmax(self.volume_m3(body.position_m), 0.1 * dead_m3)
-        travel_m = body.position_m if self.side > 0 else self.stroke_m - body.position_m
+        volume_m3 = ca.fmax(self.volume_m3(*positions_m), 0.1 * dead_m3)
+        length_m = self.length_m(body.position_m)
+        diameter_m = ca.sqrt(4.0 / pi * self.area_m2)
         return {
             "volume_m3": volume_m3,
             "volume_rate_m3_s": self.side * self.area_m2 * body.velocity_m_s,
             "temperature_k": self.temperature_k(own, volume_m3),
-            "length_m": travel_m,
+            "length_m": length_m,
             "area_m2": self.area_m2,
+            "surface_m2": 2.0 * self.area_m2 + pi * diameter_m * ca.fmax(length_m, 0.0),
             "gas_constant_j_kg_k": self.gas_constant_j_kg_k,
         }
 

@@ -19,12 +19,16 @@ from workbench.model import Model
 
 @dataclass(frozen=True)
 class Signal:
-    """An input of the plant: a command, or a disturbance such as the supply pressure."""
+    """An input of the plant: a command, or a disturbance such as the supply pressure.
+
+    ``levels`` are the only values that a switched input takes, none where it is continuous.
+    """
 
     name: str
     nominal: float
     lower: float = -inf
     upper: float = inf
+    levels: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,8 @@ import numpy as np
 from workbench.plant import Plant
 from workbench.recording import Recording
 
+AT_ONCE = 5000  # samples of one call; more run no faster and take memory
+
 
 def inputs(plant: Plant, recording: Recording) -> tuple[np.ndarray, np.ndarray]:
     """Commands and measured inputs as the plant gets them, shapes (n_u, n) and (n_d, n).
@@ -60,7 +62,7 @@ def simulate(plant: Plant, recording: Recording, initial: np.ndarray | None = No
             for first, last in zip(recording.starts, ends, strict=True)
         ]
     )
-    y = received(plant, model.f.map(len(recording))(x, u, d, p)[1].full(), dt)
+    y = received(plant, _outputs(plant, x, u, d, p), dt)
     bad = ~np.isfinite(y).all(axis=0)
     if bad.any():
         raise ArithmeticError(
@@ -81,5 +83,22 @@ def _run(
         return np.zeros((0, n))
     if n < 2:
         return x0[:, None]
-    later = plant.model.compiled_step(dt).mapaccum(n - 1)(x0, u[:, :-1], d[:, :-1], p).full()
-    return np.hstack([x0[:, None], later])
+    step, rows = plant.model.compiled_step(dt), [np.reshape(x0, (-1, 1))]
+    for part in _parts(n - 1):
+        several = step.mapaccum(part.stop - part.start)
+        rows.append(several(rows[-1][:, -1], u[:, part], d[:, part], p).full())
+    return np.hstack(rows)
+
+
+def _outputs(
+    plant: Plant, x: np.ndarray, u: np.ndarray, d: np.ndarray, p: np.ndarray
+) -> np.ndarray:
+    """Outputs at every sample, shape (n_y, n)."""
+    h, n = plant.model.h, max(u.shape[1], d.shape[1])
+    several = ((h.map(s.stop - s.start), s) for s in _parts(n))
+    return np.hstack([give(x[:, s], u[:, s], d[:, s], p).full() for give, s in several])
+
+
+def _parts(n: int) -> list[slice]:
+    """Samples 0 to n in parts: CasADi copies all parameters for every sample of a call."""
+    return [slice(first, min(first + AT_ONCE, n)) for first in range(0, n, AT_ONCE)]

@@ -70,6 +70,7 @@ _UNITS = {
     "a": ("A", "A"),
     "ohm": ("ohm", "ohm"),
     "h": ("H", "H"),
+    "per_h": ("1/H", "1/H"),
     "rad": ("rad", "deg"),
     "rad_s": ("rad/s", "deg/s"),
     "per_pa": ("1/Pa", "1/bar"),

@@ -1,6 +1,7 @@
 """The catalogue of effects.  A new effect is one file here and one line below."""
 
 from workbench.effects.bristle_friction import BristleFriction
+from workbench.effects.detent import Detent
 from workbench.effects.five_port_valve import FivePortValve
 from workbench.effects.forces import (
     ConstantForce,
@@ -10,19 +11,24 @@ from workbench.effects.forces import (
     SpringForce,
     Weight,
 )
+from workbench.effects.friction_thermal import ThermalFriction
 from workbench.effects.joints import JointFriction, LinkGravity
 from workbench.effects.leaks import ChamberLeak, PistonLeak
+from workbench.effects.lever_link import LeverLink
+from workbench.effects.piston_contact import PistonContact
 from workbench.effects.proportional_valve import ProportionalValve
 from workbench.effects.sensor_offset import (
     AngleSensorOffset,
     PositionSensorOffset,
     PressureSensorOffset,
 )
+from workbench.effects.solenoid_valve import SolenoidValve
 from workbench.effects.stribeck_friction import StribeckFriction
 from workbench.effects.supply_droop import SupplyDroop
+from workbench.effects.synchroniser import Synchroniser
 from workbench.effects.timing import ClockDrift, PacketPause, SensorDelay
 from workbench.effects.valve_command import CommandDelay, DeadZone, ValveLag, ValveOffset
-from workbench.effects.wall_heat import WallHeat
+from workbench.effects.wall_heat import ConstantWallHeat, WallHeat
 
 CATALOGUE = (
     AngleSensorOffset,
@@ -31,22 +37,29 @@ CATALOGUE = (
     ClockDrift,
     CommandDelay,
     ConstantForce,
+    ConstantWallHeat,
     DeadZone,
+    Detent,
     EndCushion,
     EndStops,
     FivePortValve,
     JointFriction,
+    LeverLink,
     LinkGravity,
     PacketPause,
+    PistonContact,
     PistonLeak,
     PositionSensorOffset,
     PressureSensorOffset,
     ProportionalValve,
     RodEnd,
     SensorDelay,
+    SolenoidValve,
     SpringForce,
     StribeckFriction,
     SupplyDroop,
+    Synchroniser,
+    ThermalFriction,
     ValveLag,
     ValveOffset,
     WallHeat,

@@ -108,12 +108,12 @@ class BristleFriction(StribeckFriction):
         yield State("deflection_m", initial=0.0, scale=2e-5, tolerance=1e-8)
 
     def terms(self, now: Conditions) -> Iterator[Force]:
-        velocity_m_s, z = now[self.body].velocity_m_s, now[self.name].deflection_m
+        velocity_m_s, z = self.sliding_velocity_m_s(now), now[self.name].deflection_m
         plain_n = self.dry_force_n(now) * ca.tanh(self.steepness_s_m * velocity_m_s)
         stiffness_n_m = self._static_force_n(now) / self.breakaway_deflection_m
         bristle_n = stiffness_n_m * (z + self.bristle_time_s * self._rate(now))
         dry_n = plain_n + self.presliding_share * (bristle_n - plain_n)
-        yield Force(self.body, -dry_n - self.viscous_force_n(velocity_m_s))
+        yield from self.opposing(dry_n + self.viscous_force_n(velocity_m_s))
 
     def rates(self, now: Conditions, received: Received) -> dict[str, Expression]:
         return {"deflection_m": self._rate(now)}
@@ -122,7 +122,7 @@ class BristleFriction(StribeckFriction):
         return self.coulomb_force_n + self.stiction_excess_n + self._pressed_n(now)
 
     def _rate(self, now: Conditions) -> Expression:
-        velocity_m_s, z = now[self.body].velocity_m_s, now[self.name].deflection_m
+        velocity_m_s, z = self.sliding_velocity_m_s(now), now[self.name].deflection_m
         static_n = self._static_force_n(now) + NEGLIGIBLE_FORCE_N
         relative = (self.dry_force_n(now) + NEGLIGIBLE_FORCE_N) / static_n
         limit_m = self.breakaway_deflection_m * ca.fmax(relative, LEAST_DEFLECTION)

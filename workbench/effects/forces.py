@@ -19,6 +19,23 @@ from workbench.effect import (
 )
 
 
+def push_n(
+    depth_m: Expression,
+    depth_rate_m_s: Expression,
+    stiffness_n_m: Expression,
+    damping_n_s_m: Expression,
+) -> Expression:
+    """Contact force, never pulling: max(0, s depth + d rate) for depth > 0, else 0.
+
+    Without stiffness there is no damping either.
+
+    Source: physics.md 1.4; paper 003 Eqs. 9 and 11, which may pull while separating (E003-6).
+    """
+    present = ca.fmin(stiffness_n_m, 1.0)
+    force_n = stiffness_n_m * depth_m + present * damping_n_s_m * depth_rate_m_s
+    return ca.if_else(depth_m > 0, ca.fmax(force_n, 0.0), 0.0)
+
+
 @dataclass(frozen=True, kw_only=True)
 class ConstantForce(Effect):
     """Gravity along an inclined axis, a preload, a hanging load: F = F_0, signed.
@@ -104,6 +121,8 @@ class EndCushion(Effect):
 
     The edge is a straight ramp over a tenth of the length, so that the force has a slope.
 
+    The stroke begins at ``lower_m``.
+
     Source: physics.md section 6 (stops / cushioning); interface.md section 6.
     """
 
@@ -123,10 +142,12 @@ class EndCushion(Effect):
     damping_n_s_m: Expression = strength(typical=150.0, upper=500.0)
     length_m: Expression = form(0.015, lower=0.005, upper=0.04)
     stroke_m: Expression = form(0.1, lower=1e-6)
+    lower_m: Expression = form(0.0, lower=-10.0, upper=10.0)
 
     def terms(self, now: Conditions) -> Iterator[Force]:
         body = now[self.body]
-        to_end_m = ca.fmin(body.position_m, self.stroke_m - body.position_m)
+        travelled_m = body.position_m - self.lower_m
+        to_end_m = ca.fmin(travelled_m, self.stroke_m - travelled_m)
         within = (self.length_m - to_end_m) / (0.1 * self.length_m)
         share = ca.fmin(ca.fmax(within, 0.0), 1.0)
         yield Force(self.body, -self.damping_n_s_m * share * body.velocity_m_s)
@@ -149,10 +170,7 @@ class EndStops(Effect):
 
     def terms(self, now: Conditions) -> Iterator[Force]:
         body = now[self.body]
-        yield Force(self.body, self._push(self.lower_m - body.position_m, -body.velocity_m_s))
-        yield Force(self.body, -self._push(body.position_m - self.upper_m, body.velocity_m_s))
-
-    def _push(self, depth_m: Expression, depth_rate_m_s: Expression) -> Expression:
-        present = ca.fmin(self.stiffness_n_m, 1.0)  # without stiffness no damping either
-        force_n = self.stiffness_n_m * depth_m + present * self.damping_n_s_m * depth_rate_m_s
-        return ca.if_else(depth_m > 0, ca.fmax(force_n, 0.0), 0.0)
+        low_m, high_m = self.lower_m - body.position_m, body.position_m - self.upper_m
+        wall = (self.stiffness_n_m, self.damping_n_s_m)
+        yield Force(self.body, push_n(low_m, -body.velocity_m_s, *wall))
+        yield Force(self.body, -push_n(high_m, body.velocity_m_s, *wall))

@@ -29,7 +29,8 @@ class StribeckFriction(Effect):
     Each coefficient counts times 1 + w e for v >= 0 and 1 - w e below, with e ``asymmetry`` and w
     its weight.  F_ex = F_S - F_C is the excess of static friction; i is 2 in paper 002 and 5 in
     paper 000, where the tanh keeps the peak below F_S (erratum E000-10).  dp is the pressure
-    between the two ``chambers``, or of the one against ambient.
+    between the two ``chambers``, or of the one against ambient.  v is the velocity of the body,
+    relative to the body ``against`` where it rubs on one: that one gets the opposite force.
 
     Source: paper 000 Eq. 11 (F3 of physics.md 1.3); asymmetry by paper 002 Table 5 (erratum
     E002-6: magnitudes for v < 0); place and pressure by physics.md section 6.  Deviations from
@@ -98,6 +99,7 @@ class StribeckFriction(Effect):
 
     body: str
     chambers: tuple[str, ...] = ()
+    against: str | None = None
     stribeck_exponent: int = 2
 
     coulomb_force_n: Expression = strength(typical=60.0, upper=1e3)
@@ -115,13 +117,24 @@ class StribeckFriction(Effect):
     phase_rad: Expression = form(0.0, lower=-10.0, upper=10.0, deviation=1.0)
 
     def terms(self, now: Conditions) -> Iterator[Force]:
-        velocity_m_s = now[self.body].velocity_m_s
+        velocity_m_s = self.sliding_velocity_m_s(now)
         dry_n = self.dry_force_n(now) * ca.tanh(self.steepness_s_m * velocity_m_s)
-        yield Force(self.body, -dry_n - self.viscous_force_n(velocity_m_s))
+        yield from self.opposing(dry_n + self.viscous_force_n(velocity_m_s))
+
+    def opposing(self, friction_n: Expression) -> Iterator[Force]:
+        """Friction on the body, and its reaction on what the body rubs on."""
+        yield Force(self.body, -friction_n)
+        if self.against:
+            yield Force(self.against, friction_n)
+
+    def sliding_velocity_m_s(self, now: Conditions) -> Expression:
+        """Velocity of the body past what it rubs on."""
+        velocity_m_s = now[self.body].velocity_m_s
+        return velocity_m_s - now[self.against].velocity_m_s if self.against else velocity_m_s
 
     def dry_force_n(self, now: Conditions) -> Expression:
         """g: the dry force of steady sliding, positive."""
-        velocity_m_s = now[self.body].velocity_m_s
+        velocity_m_s = self.sliding_velocity_m_s(now)
         side = ca.if_else(velocity_m_s >= 0, self.asymmetry, -self.asymmetry)
         relative = ca.fabs(velocity_m_s) / self.stribeck_velocity_m_s
         peak = ca.exp(-ca.fmin(relative**self.stribeck_exponent, 50.0))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import pi
+from types import SimpleNamespace
 
 import casadi as ca
 
@@ -21,14 +21,15 @@ from workbench.effect import (
 
 
 @dataclass(frozen=True, kw_only=True)
-class WallHeat(Effect):
-    """Convection to a wall at supply temperature, by the Eichelberg law.
+class ConstantWallHeat(Effect):
+    """Convection with a constant coefficient to a wall at the temperature of ``wall``.
 
-    Q = lambda_0 A_q sqrt(p T / (p_0 T_0)) (T_w - T),   A_q = 2 S + pi d l
+    Q = lambda A_q (T_w - T)
 
-    with S the piston area, d its diameter and l the length of the chamber.
+    with A_q the wall area of the chamber, 2 S + pi d l where one piston of area S closes it.
 
-    Source: paper 002 Eqs. 6 and 7, Table 4; T_w = T_s as printed there.
+    Source: paper 003 Eqs. 5 and 6, T_w = T_amb.  Its Eq. 7 lacks the factor kappa - 1 in front of
+    the heat (erratum E003-1); the chamber's balance has it.
     """
 
     causes = (
@@ -38,23 +39,42 @@ class WallHeat(Effect):
             balance=Balance.ENERGY,
             drivers=("rate of the pressure", "gas temperature"),
             shown_by="fast fill, then valve closed for 5 s",
-            source="paper 002 Eqs. 6, 7, Table 4",
+            source="papers 002 Eqs. 6, 7, Table 4; 003 Eqs. 5 to 7",
         ),
     )
 
     chambers: tuple[str, ...]
+    wall: str = "atmosphere"
 
     coefficient_w_m2_k: Expression = strength(typical=50.0, upper=1e3)
+
+    def terms(self, now: Conditions) -> Iterator[HeatFlow]:
+        wall_k = now[self.wall].temperature_k
+        for chamber in self.chambers:
+            gas = now[chamber]
+            conductance_w_k = self.coefficient_w_m2_k * gas.surface_m2 * self.relative(gas)
+            yield HeatFlow(chamber, conductance_w_k * (wall_k - gas.temperature_k))
+
+    def relative(self, gas: SimpleNamespace) -> Expression:
+        """The coefficient at this state of the gas, relative to the parameter."""
+        return 1.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class WallHeat(ConstantWallHeat):
+    """Convection to a wall at supply temperature, by the Eichelberg law.
+
+    Q = lambda_0 A_q sqrt(p T / (p_0 T_0)) (T_w - T)
+
+    Source: paper 002 Eqs. 6 and 7, Table 4; T_w = T_s as printed there.
+    """
+
+    wall: str = "supply"
+
     reference_pressure_pa: Expression = form(5.65e5, lower=1.0)
     reference_temperature_k: Expression = form(293.15, lower=1.0)
 
-    def terms(self, now: Conditions) -> Iterator[HeatFlow]:
-        wall_k = now["supply"].temperature_k
-        for chamber in self.chambers:
-            gas = now[chamber]
-            diameter_m = ca.sqrt(4.0 / pi * gas.area_m2)
-            surface_m2 = 2.0 * gas.area_m2 + pi * diameter_m * ca.fmax(gas.length_m, 0.0)
-            load = ca.fmax(gas.pressure_pa, 0.0) * gas.temperature_k
-            load /= self.reference_pressure_pa * self.reference_temperature_k
-            conductance_w_k = self.coefficient_w_m2_k * surface_m2 * ca.sqrt(load + 1e-12)
-            yield HeatFlow(chamber, conductance_w_k * (wall_k - gas.temperature_k))
+    def relative(self, gas: SimpleNamespace) -> Expression:
+        load = ca.fmax(gas.pressure_pa, 0.0) * gas.temperature_k
+        load /= self.reference_pressure_pa * self.reference_temperature_k
+        return ca.sqrt(load + 1e-12)

@@ -4,11 +4,13 @@ from workbench.plants.crr_arm import crr_arm
 from workbench.plants.crr_leg import crr_leg
 from workbench.plants.crr_rig import crr_rig
 from workbench.plants.cylinder_bench import cylinder_bench
+from workbench.plants.gearbox import gearbox
 from workbench.plants.servo_drive import servo_drive
 from workbench.plants.vertical_cylinder import vertical_cylinder
 
 PLANTS = {
     "servo_drive": servo_drive,
+    "gearbox": gearbox,
     "vertical_cylinder": vertical_cylinder,
     "cylinder_bench": cylinder_bench,
     "crr_rig": crr_rig,

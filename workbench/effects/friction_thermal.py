@@ -1,0 +1,66 @@
+"""Seals that rub less once they are warm."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import casadi as ca
+
+from workbench.effect import (
+    Balance,
+    Cause,
+    Conditions,
+    Effect,
+    Expression,
+    Force,
+    Received,
+    State,
+    form,
+    strength,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ThermalFriction(Effect):
+    """Friction falls with the temperature that rubbing gives the seal.
+
+    dF = -k_T w tanh(k v),   dw/dt = c F_r |v| - w / tau,   w = T_seal - T_room
+
+    The heat comes from a typical friction force F_r, since effects do not see each other; only the
+    product c F_r counts, in kelvin per metre of travel.
+
+    Source: future work in paper 002 (Eq. 15, F = F_EPF + dF(T)); physics.md section 6
+    (thermal_friction).
+    """
+
+    causes = (
+        Cause(
+            name="friction_thermal",
+            strength="softening_n_k",
+            forms=("warming_time_s",),
+            balance=Balance.MOMENTUM,
+            drivers=("distance travelled so far", "sign of the velocity"),
+            shapes={"warming_time_s": (300.0, 1000.0, 3000.0)},
+            shown_by="strokes repeated for many minutes from cold",
+            source="paper 002 Eq. 15; physics.md section 6 (thermal_friction)",
+        ),
+    )
+
+    body: str
+    softening_n_k: Expression = strength(typical=0.5, upper=5.0)
+    warming_time_s: Expression = form(1000.0, lower=30.0, upper=1e4, relative_deviation=0.2)
+    heating_k_j: Expression = form(0.01, lower=1e-5, upper=1.0)
+    rubbing_force_n: Expression = form(40.0, lower=0.1, upper=1e3)
+    steepness_s_m: Expression = form(500.0, lower=1.0, upper=1e5)
+
+    def states(self) -> Iterator[State]:
+        yield State("warmer_k", initial=0.0, scale=10.0)
+
+    def terms(self, now: Conditions) -> Iterator[Force]:
+        side = ca.tanh(self.steepness_s_m * now[self.body].velocity_m_s)
+        yield Force(self.body, self.softening_n_k * now[self.name].warmer_k * side)
+
+    def rates(self, now: Conditions, received: Received) -> dict[str, Expression]:
+        heated = self.heating_k_j * self.rubbing_force_n * ca.fabs(now[self.body].velocity_m_s)
+        return {"warmer_k": heated - now[self.name].warmer_k / self.warming_time_s}
