@@ -4,16 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from math import pi
 
 import casadi as ca
 import numpy as np
 
-from workbench.air import (
-    GAS_CONSTANT_J_KG_K,
-    HEAT_CAPACITY_RATIO,
-    LOWEST_PRESSURE_PA,
-    LOWEST_TEMPERATURE_K,
-)
 from workbench.effect import (
     AddedMass,
     Balance,
@@ -21,9 +16,7 @@ from workbench.effect import (
     Conditions,
     Expression,
     Force,
-    HeatFlow,
     Kind,
-    MassFlow,
     Part,
     Received,
     State,
@@ -31,13 +24,7 @@ from workbench.effect import (
     form,
     strength,
 )
-
-LOWEST_MASS_KG = 1e-9
-
-
-def total(terms: list[Term], kind: type[Term]) -> Expression:
-    """Sum of the values of one kind of term."""
-    return sum(term.value for term in terms if isinstance(term, kind))
+from workbench.gas_volume import GasVolume, total
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -148,15 +135,15 @@ class PressureFace(Part):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Chamber(Part):
+class Chamber(GasVolume):
     """A gas volume closed by a moving body, with its pressure and its mass of gas as states.
 
-    V dp/dt = kappa R sum(mdot T) - kappa p dV/dt + (kappa - 1) sum(Q)
-    dm/dt   = sum(mdot),     T = p V / (m R)
-    V       = V_dead (1 + e) + A x   (side +1)   or   V_dead (1 + e) + A (L - x)   (side -1)
+    V = V_dead (1 + e) + A x   (side +1)   or   V_dead (1 + e) + A (L - x)   (side -1)
 
-    Source: paper 002 Eqs. 4 and 5 in the (p, m) form of physics.md 1.2 level 1, which conserves
-    mass by construction; dead volume by erratum E002-8.
+    Surface of the wall: 2 A + pi d l, with d the diameter and l the length of the chamber.
+
+    Source: paper 002 Eqs. 4 and 5, in the balance of :class:`GasVolume`; dead volume by erratum
+    E002-8.
     """
 
     causes = (
@@ -178,20 +165,10 @@ class Chamber(Part):
     stroke_m: Expression = form(0.1, lower=1e-6)
     dead_volume_m3: Expression = form(1e-5, lower=1e-9, relative_deviation=0.05)
     dead_volume_change: Expression = strength(typical=0.5, lower=-0.87, upper=2.0)
-    gas_constant_j_kg_k: float = GAS_CONSTANT_J_KG_K
-    initial_pressure_pa: float = 1e5
-    initial_temperature_k: float = 293.15
     initial_position_m: float = 0.0
 
-    def states(self) -> Iterator[State]:
-        filled_kg = self.filled_mass_kg(self.initial_pressure_pa, self.initial_position_m)
-        yield State("pressure_pa", self.initial_pressure_pa, scale=1e5, tolerance=20.0)
-        yield State("mass_kg", filled_kg, scale=1e-4, tolerance=1e-8)
-
-    def filled_mass_kg(self, pressure_pa: Expression, position_m: Expression) -> Expression:
-        """Mass of gas at a pressure and the initial temperature, the body at ``position_m``."""
-        gas_j_kg = self.gas_constant_j_kg_k * self.initial_temperature_k
-        return pressure_pa * self.volume_m3(position_m) / gas_j_kg
+    def initial_volume_m3(self) -> Expression:
+        return self.volume_m3(self.initial_position_m)
 
     def volume_m3(self, position_m: Expression) -> Expression:
         """Gas volume with the body at ``position_m``."""
@@ -203,37 +180,20 @@ class Chamber(Part):
         position_m = seen.get(f"{self.body}.position_m")
         if pressure_pa is None or position_m is None:
             return {}
-        filled_kg = self.filled_mass_kg(pressure_pa, position_m)
-        return {
-            "pressure_pa": (pressure_pa, 2e3),
-            "mass_kg": (filled_kg, 0.05 * float(np.median(filled_kg))),
-        }
+        return self.guessed(pressure_pa, self.volume_m3(position_m))
 
     def derive(self, now: Conditions) -> dict[str, Expression]:
-        own, body = now[self.name], now[self.body]
+        body = now[self.body]
         dead_m3 = self.dead_volume_m3 * (1.0 + self.dead_volume_change)
         volume_m3 = ca.fmax(self.volume_m3(body.position_m), 0.1 * dead_m3)
-        pressure_pa = ca.fmax(own.pressure_pa, LOWEST_PRESSURE_PA)
-        content_j_k = ca.fmax(own.mass_kg, LOWEST_MASS_KG) * self.gas_constant_j_kg_k
         travel_m = body.position_m if self.side > 0 else self.stroke_m - body.position_m
-        return {
-            "volume_m3": volume_m3,
+        around_m = pi * ca.sqrt(4.0 / pi * self.area_m2)
+        return self.gas(now, volume_m3) | {
             "volume_rate_m3_s": self.side * self.area_m2 * body.velocity_m_s,
-            "temperature_k": ca.fmax(pressure_pa * volume_m3 / content_j_k, LOWEST_TEMPERATURE_K),
             "length_m": travel_m,
             "area_m2": self.area_m2,
-            "gas_constant_j_kg_k": self.gas_constant_j_kg_k,
+            "surface_m2": 2.0 * self.area_m2 + around_m * ca.fmax(travel_m, 0.0),
         }
 
     def terms(self, now: Conditions) -> Iterator[Term]:
         yield Force(self.body, self.side * self.area_m2 * now[self.name].pressure_pa)
-
-    def rates(self, now: Conditions, received: Received) -> dict[str, Expression]:
-        own, got, kappa = now[self.name], received(self.name), HEAT_CAPACITY_RATIO
-        carried = sum(t.value * t.temperature_k for t in got if isinstance(t, MassFlow))
-        energy_w = (
-            kappa * self.gas_constant_j_kg_k * carried
-            - kappa * own.pressure_pa * own.volume_rate_m3_s
-            + (kappa - 1.0) * total(got, HeatFlow)
-        )
-        return {"pressure_pa": energy_w / own.volume_m3, "mass_kg": total(got, MassFlow)}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import pi
 
 import casadi as ca
 
@@ -24,9 +23,7 @@ from workbench.effect import (
 class WallHeat(Effect):
     """Convection to a wall at supply temperature, by the Eichelberg law.
 
-    Q = lambda_0 A_q sqrt(p T / (p_0 T_0)) (T_w - T),   A_q = 2 S + pi d l
-
-    with S the piston area, d its diameter and l the length of the chamber.
+    Q = lambda_0 A_q sqrt(p T / (p_0 T_0)) (T_w - T),   A_q the chamber's own surface
 
     Source: paper 002 Eqs. 6 and 7, Table 4; T_w = T_s as printed there.
     """
@@ -52,9 +49,7 @@ class WallHeat(Effect):
         wall_k = now["supply"].temperature_k
         for chamber in self.chambers:
             gas = now[chamber]
-            diameter_m = ca.sqrt(4.0 / pi * gas.area_m2)
-            surface_m2 = 2.0 * gas.area_m2 + pi * diameter_m * ca.fmax(gas.length_m, 0.0)
             load = ca.fmax(gas.pressure_pa, 0.0) * gas.temperature_k
             load /= self.reference_pressure_pa * self.reference_temperature_k
-            conductance_w_k = self.coefficient_w_m2_k * surface_m2 * ca.sqrt(load + 1e-12)
+            conductance_w_k = self.coefficient_w_m2_k * gas.surface_m2 * ca.sqrt(load + 1e-12)
             yield HeatFlow(chamber, conductance_w_k * (wall_k - gas.temperature_k))
