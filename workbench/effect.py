@@ -74,6 +74,10 @@ class AddedMass(Term):
     """Mass that moves along with a body, in kg."""
 
 
+class PressureRate(Term):
+    """What a model without a balance of gas adds to the rate of a pressure, in Pa/s."""
+
+
 @dataclass(frozen=True)
 class MassFlow(Term):
     """Gas entering a balance, in kg/s, with the temperature it brings along."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 import casadi as ca
 import numpy as np
@@ -19,6 +20,7 @@ from workbench.effect import (
     form,
     strength,
 )
+from workbench.effects.line_delay import delayed
 
 FADING_V = 0.01  # half-width of a band below which its centre loses its meaning
 
@@ -78,27 +80,39 @@ class ValveLag(Effect):
     )
 
     signal: str
+    lagged: ClassVar[str] = "lagged_v"
     initial_v: float = 5.0
     time_constant_s: Expression = strength(typical=20e-3, upper=0.2)
     shortest_s: Expression = form(0.5e-3, lower=1e-4, upper=1e-2)
 
     def states(self) -> Iterator[State]:
-        yield State("lagged_v", initial=self.initial_v, scale=1.0)
+        yield State(self.lagged, initial=self.initial_v, scale=1.0)
 
     def guess(self, seen: Mapping[str, np.ndarray]) -> dict[str, tuple[np.ndarray | float, float]]:
-        return {"lagged_v": (seen[self.signal], 0.1)} if self.signal in seen else {}
+        return {self.lagged: (seen[self.signal], 0.1)} if self.signal in seen else {}
 
     def alter(self, signal: str, value: Expression, now: Conditions) -> Expression:
         if signal != self.signal:
             return value
-        now.place(f"{self.name}.entering_v", value)
+        now.place(f"{self.name}.entering", value)
         share = 1.0 - ca.exp(-self.time_constant_s / self.shortest_s)
-        return value + share * (now[self.name].lagged_v - value)
+        return value + share * (now.read(f"{self.name}.{self.lagged}") - value)
 
     def rates(self, now: Conditions, received: Received) -> dict[str, Expression]:
-        own, shortest_s = now[self.name], self.shortest_s
+        shortest_s, lagged = self.shortest_s, now.read(f"{self.name}.{self.lagged}")
         effective_s = self.time_constant_s + shortest_s * ca.exp(-self.time_constant_s / shortest_s)
-        return {"lagged_v": (own.entering_v - own.lagged_v) / effective_s}
+        return {self.lagged: (now[self.name].entering - lagged) / effective_s}
+
+
+@dataclass(frozen=True, kw_only=True)
+class PwmLag(ValveLag):
+    """The same lag on a command from 0 to 1; ``initial_v`` is such a command too.
+
+    Source: physics.md section 6 (valve_dynamics).
+    """
+
+    lagged: ClassVar[str] = "lagged_share"
+    initial_v: float = 0.5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -188,7 +202,6 @@ class CommandDelay(Effect):
     delay_s: Expression = strength(typical=15e-3, upper=0.2)
 
     def resample(self, channel: str, values: np.ndarray, sample_time_s: float) -> np.ndarray:
-        if channel != self.signal or self.delay_s == 0.0:
+        if channel != self.signal:
             return values
-        samples = np.arange(len(values), dtype=float)
-        return np.interp(samples - float(self.delay_s) / sample_time_s, samples, values)
+        return delayed(values, float(self.delay_s), sample_time_s)

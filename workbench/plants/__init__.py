@@ -2,10 +2,14 @@
 
 from workbench.plants.cylinder_bench import cylinder_bench
 from workbench.plants.servo_drive import servo_drive
+from workbench.plants.soft_joint import soft_joint
+from workbench.plants.soft_joint_parametric import soft_joint_parametric
 from workbench.plants.vertical_cylinder import vertical_cylinder
 
 PLANTS = {
     "servo_drive": servo_drive,
     "vertical_cylinder": vertical_cylinder,
     "cylinder_bench": cylinder_bench,
+    "soft_joint": soft_joint,
+    "soft_joint_parametric": soft_joint_parametric,
 }
