@@ -54,7 +54,7 @@ def acts_on_sequences(member):
 def answers(plant, at):
     """Rates of the states and outputs, by name, each of shape (n,)."""
     columns = plant.model.f.map(at.x.shape[1])(at.x, at.u, at.d, plant.nominal[2])
-    names = (*plant.model.states, *plant.model.measured)
+    names = (*(f"rate of {name}" for name in plant.model.states), *plant.model.measured)
     return dict(zip(names, np.vstack([c.full() for c in columns]), strict=True))
 
 
