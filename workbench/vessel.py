@@ -26,7 +26,33 @@ from workbench.gas_volume import GasVolume, total
 
 @dataclass(frozen=True, kw_only=True)
 class Vessel(GasVolume):
-    """A volume that may give way under its pressure: V = V_0 + V_line + C_b (p - p_atm).
+    """A rigid volume: a tank, a closed chamber.
+
+    Source: paper 002 (identification by a reservoir); physics.md 2.4 and 2.7.
+    """
+
+    volume_m3: Expression = form(5e-4, lower=1e-9, relative_deviation=0.05)
+    surface_m2: Expression = form(3e-2, lower=1e-6, upper=10.0)
+
+    def initial_volume_m3(self) -> Expression:
+        return self.volume_m3
+
+    def guess(self, seen: Mapping[str, np.ndarray]) -> dict[str, tuple[np.ndarray | float, float]]:
+        pressure_pa = seen.get(f"{self.name}.pressure_pa")
+        if pressure_pa is None:
+            return {}
+        return self.guessed(pressure_pa, np.full_like(pressure_pa, self.initial_volume_m3()))
+
+    def derive(self, now: Conditions) -> dict[str, Expression]:
+        return self.gas(now, self.initial_volume_m3()) | {
+            "volume_rate_m3_s": 0.0,
+            "surface_m2": self.surface_m2,
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bellows(Vessel):
+    """A volume that gives way under its pressure: V = V_0 + V_line + C_b (p - p_atm).
 
     Source: paper 004 Eq. 1 and its future work (expansion); physics.md section 6
     (volume_expansion, line_volume).
@@ -53,27 +79,18 @@ class Vessel(GasVolume):
         ),
     )
 
-    volume_m3: Expression = form(5e-4, lower=1e-9, relative_deviation=0.05)
     expansion_m3_pa: Expression = strength(typical=2.5e-10, upper=5e-9)
     line_volume_m3: Expression = strength(typical=2e-5, upper=1e-3)
-    surface_m2: Expression = form(3e-2, lower=1e-6, upper=10.0)
 
     def initial_volume_m3(self) -> Expression:
         return self.volume_m3 + self.line_volume_m3
 
-    def guess(self, seen: Mapping[str, np.ndarray]) -> dict[str, tuple[np.ndarray | float, float]]:
-        pressure_pa = seen.get(f"{self.name}.pressure_pa")
-        if pressure_pa is None:
-            return {}
-        return self.guessed(pressure_pa, np.full_like(pressure_pa, self.initial_volume_m3()))
-
     def derive(self, now: Conditions) -> dict[str, Expression]:
         gauge_pa = now[self.name].pressure_pa - now["atmosphere"].pressure_pa
-        grown_m3 = self.volume_m3 + self.line_volume_m3 + self.expansion_m3_pa * gauge_pa
-        return self.gas(now, ca.fmax(grown_m3, 0.1 * self.volume_m3)) | {
-            "volume_rate_m3_s": 0.0,
+        grown_m3 = self.initial_volume_m3() + self.expansion_m3_pa * gauge_pa
+        return super().derive(now) | {
+            "volume_m3": ca.fmax(grown_m3, 0.1 * self.volume_m3),
             "compliance_m3_pa": self.expansion_m3_pa,
-            "surface_m2": self.surface_m2,
         }
 
 

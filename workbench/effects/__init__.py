@@ -21,7 +21,7 @@ from workbench.effects.valve_command import (
     ValveOffset,
 )
 from workbench.effects.valve_hysteresis import ValveHysteresis
-from workbench.effects.wall_heat import WallHeat
+from workbench.effects.wall_heat import HeatedWall, WallHeat
 
 CATALOGUE = (
     BellowsCreep,
@@ -33,6 +33,7 @@ CATALOGUE = (
     EndCushion,
     EndStops,
     FivePortValve,
+    HeatedWall,
     ParametricValve,
     PistonLeak,
     PositionSensorOffset,

@@ -24,6 +24,8 @@ from workbench.effect import (
 class FivePortValve(Effect):
     """Spool above centre: ``first`` is charged and ``second`` exhausted; below, the reverse.
 
+    Without a ``second`` chamber that port is blocked.
+
     s        = (u - u_c) / (10 V - u_c)  above,   (u_c - u) / u_c  below the centre
     A_path   = A_max f [1 - (1 - s)^e],  f = f_supply, or f_exhaust (1 - share)
     mdot     = C_d A_path C_chk p_u / sqrt(T_u) psi(p_d / p_u)  +  leak
@@ -67,7 +69,7 @@ class FivePortValve(Effect):
     )
 
     first: str
-    second: str
+    second: str | None = None
     gas_constant_j_kg_k: float = GAS_CONSTANT_J_KG_K
 
     flow_area_m2: Expression = form(1e-5, lower=1e-9, upper=1e-3, relative_deviation=0.05)
@@ -96,7 +98,8 @@ class FivePortValve(Effect):
         forward = self._area_m2(offset_v, self.full_v - self.centre_v)
         reverse = self._area_m2(-offset_v, self.centre_v)
         yield from self._port(self.first, forward, reverse, now)
-        yield from self._port(self.second, reverse, forward, now)
+        if self.second is not None:
+            yield from self._port(self.second, reverse, forward, now)
 
     def _area_m2(self, offset_v: Expression, range_v: Expression) -> Expression:
         """Effective area of a path, without its fraction, at an offset towards its own side."""

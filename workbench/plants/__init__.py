@@ -1,7 +1,9 @@
 """The plants of the papers.  A new plant is one file here and one line below."""
 
+from workbench.plants.closed_chamber import closed_chamber
 from workbench.plants.cylinder_bench import cylinder_bench
 from workbench.plants.servo_drive import servo_drive
+from workbench.plants.servo_reservoir import servo_reservoir
 from workbench.plants.soft_joint import soft_joint
 from workbench.plants.soft_joint_parametric import soft_joint_parametric
 from workbench.plants.vertical_cylinder import vertical_cylinder
@@ -10,6 +12,8 @@ PLANTS = {
     "servo_drive": servo_drive,
     "vertical_cylinder": vertical_cylinder,
     "cylinder_bench": cylinder_bench,
+    "closed_chamber": closed_chamber,
+    "servo_reservoir": servo_reservoir,
     "soft_joint": soft_joint,
     "soft_joint_parametric": soft_joint_parametric,
 }

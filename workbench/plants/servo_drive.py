@@ -42,10 +42,13 @@ SUPPLY_PA = 7.0e5
 ATMOSPHERE_PA = 1.0e5
 ROOM_K = 293.15
 REST_PA = 5.65e5  # P_0 of the paper
+RANGE_V = 10.0
 CENTRE_V = 4.95  # (zms + zmd) / 2
 HALF_WIDTH_V = 0.42  # (zmd - zms) / 2
 BRISTLE_STIFFNESS_N_M = 1.12e6
 BRISTLE_DAMPING_N_S_M = 50.0
+FLOW_AREA_M2 = 2.8274e-5
+LEAK_AREA_M2 = 8e-8
 START_M = STROKE_M / 2
 
 COMMAND = "valve.command_v"
@@ -111,9 +114,9 @@ def servo_drive() -> Plant:
                 first=a,
                 second=b,
                 gas_constant_j_kg_k=GAS_CONSTANT_J_KG_K,
-                flow_area_m2=2.8274e-5,
+                flow_area_m2=FLOW_AREA_M2,
                 centre_v=CENTRE_V,
-                leak_area_m2=8e-8,
+                leak_area_m2=LEAK_AREA_M2,
             ),
             WallHeat(name="wall_heat", chambers=(a, b), coefficient_w_m2_k=22.563),
             _friction(),
@@ -129,7 +132,7 @@ def servo_drive() -> Plant:
             PressureSensorOffset(name="sensor_offset@chamber_a.pressure", signal=OUTPUTS[1]),
             PressureSensorOffset(name="sensor_offset@chamber_b.pressure", signal=OUTPUTS[2]),
         ),
-        commands=(Signal(COMMAND, nominal=CENTRE_V, lower=0.0, upper=10.0),),
+        commands=(Signal(COMMAND, nominal=CENTRE_V, lower=0.0, upper=RANGE_V),),
         optional_inputs=(Signal("supply.pressure_pa", nominal=SUPPLY_PA),),
         measured=OUTPUTS,
         optional_outputs=("slide.velocity_m_s",),

@@ -32,7 +32,7 @@ from workbench.effects import (
 from workbench.gas_volume import ConstantTemperatureLevel
 from workbench.parts import Atmosphere, Supply
 from workbench.plant import Plant, Signal
-from workbench.vessel import Vessel
+from workbench.vessel import Bellows
 
 COMPRESSIBILITY, MOLAR_J_MOL_K, MOLAR_MASS_KG_MOL = 0.99, 8.31, 0.029
 GAS_CONSTANT_J_KG_K = COMPRESSIBILITY * MOLAR_J_MOL_K / MOLAR_MASS_KG_MOL
@@ -52,7 +52,7 @@ def soft_joint() -> Plant:
         parts=(
             Supply(name="supply", pressure_pa=SUPPLY_PA, temperature_k=ROOM_K),
             Atmosphere(name="atmosphere", pressure_pa=ATMOSPHERE_PA, temperature_k=ROOM_K),
-            Vessel(
+            Bellows(
                 name="bellows",
                 volume_m3=0.5e-3,
                 gas_constant_j_kg_k=GAS_CONSTANT_J_KG_K,

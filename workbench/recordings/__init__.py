@@ -2,6 +2,6 @@
 
 from workbench.recordings.folder import real_data_folder
 
-RECORDINGS = ("printed_cylinder", "vertical_cylinder")
+RECORDINGS = ("chamber_decay", "printed_cylinder", "vertical_cylinder")
 
 __all__ = ["RECORDINGS", "real_data_folder"]
