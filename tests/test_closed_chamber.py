@@ -103,16 +103,20 @@ def fitted_mbar(plant, train, rest, guess, warmer_k=None):
     """
     recorded = np.concatenate([train[PRESSURE], rest[PRESSURE]])
     n, dt, model = len(train), train.sample_time_s, plant.model
-    size = np.array([recorded[0], warmer_k or 0.0, *guess.values()])
+    starts = [recorded[0]] if warmer_k is None else [recorded[0], warmer_k]
+    size = np.array([*starts, *guess.values()])
 
     def errors(scale):
-        p0, warmer, *values = scale * size
+        p0, *values = scale * size
+        warmer = values.pop(0) if warmer_k else 0.0
         changed = plant.with_values(dict(zip(guess, values, strict=True)))
         changed.__dict__["model"] = model  # the expressions do not depend on the values
         initial = start(p0, ROOM_K + warmer)[: len(plant.initial)]
         return (run(changed, initial, len(recorded), dt)[PRESSURE] - recorded) / 100.0
 
-    found = least_squares(lambda s: errors(s)[:n], np.ones(len(size)), diff_step=1e-5)
+    ones, bounds = np.ones(len(size)), (0.0, np.inf)
+    options = dict(diff_step=1e-4, bounds=bounds, xtol=1e-4, max_nfev=20)
+    found = least_squares(lambda s: errors(s)[:n], ones, **options)
     off = errors(found.x)
     return np.sqrt(np.mean(off[:n] ** 2)), np.sqrt(np.mean(off[n:] ** 2))
 
@@ -146,7 +150,6 @@ def test_within_140_seconds_cooling_explains_the_decay_as_well_as_a_leak(name):
 
     leaking = fitted_mbar(plant.lean(keep=["chamber_leak"]), train, rest, {LEAK: 1e-10})
     cooling = fitted_mbar(plant.lean(keep=["wall_heat"]), train, rest, {HEAT: 0.03}, warmer_k=5.0)
-    print(name, leaking, cooling)
 
     assert cooling[0] == pytest.approx(leaking[0], rel=0.05)
     assert cooling[1] < 1.5 * leaking[1]
