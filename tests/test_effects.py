@@ -137,7 +137,7 @@ def test_an_effect_at_null_is_the_same_as_no_effect(plant, conditions):
 
 def test_a_strength_at_null_can_still_be_felt_by_the_derivative(plant, conditions):
     """Where the law has a kink at null, by a short secant instead."""
-    at = conditions(plant, n=200, spread=2.0)
+    at = conditions(plant, n=1000, spread=2.0)
     for member in plant.members:
         for key in () if acts_on_sequences(member) else strengths(member):
             name, known = f"{member.name}.{key}", member.parameters()[key]

@@ -19,8 +19,6 @@ CRITICAL_RATIO = (2.0 / (HEAT_CAPACITY_RATIO + 1.0)) ** (
 LAMINAR_RATIO = 0.999  # above it the flow is linear in the ratio, so that its slope stays finite
 LOWEST_PRESSURE_PA = 1.0  # solvers try states that no gas has; the equations must survive them
 LOWEST_TEMPERATURE_K = 1.0
-VISCOSITY_PA_S = 1.8e-5  # of air at room temperature
-SOUND_M_S = sqrt(HEAT_CAPACITY_RATIO * GAS_CONSTANT_J_KG_K * 293.15)
 
 
 def choked_constant(gas_constant_j_kg_k: float) -> float:
@@ -160,18 +158,3 @@ def path_between(
     """The path between two conditions; the gas constant is that of ``above`` unless given."""
     ends = (above.pressure_pa, above.temperature_k, below.pressure_pa, below.temperature_k)
     return Path(*ends, gas_constant_j_kg_k or above.gas_constant_j_kg_k)
-
-
-def line_share(
-    length_m: Expression, diameter_m: Expression, pressure_pa: Expression, temperature_k: Expression
-) -> Expression:
-    """Share of a mass flow that comes out at the far end of a tube.
-
-    phi = exp(-R_t R T L / (2 p c)),   R_t = 32 mu / D^2   (laminar);  the delay L/c stands apart.
-
-    Source: physics.md section 6 (line_delay), after Richer and Hurmuzlu 2000.
-    """
-    friction_pa_s_m2 = 32.0 * VISCOSITY_PA_S / diameter_m**2
-    gas_m2_s2 = GAS_CONSTANT_J_KG_K * temperature_k
-    pressure_pa = ca.fmax(pressure_pa, LOWEST_PRESSURE_PA)
-    return ca.exp(-friction_pa_s_m2 * gas_m2_s2 * length_m / (2.0 * pressure_pa * SOUND_M_S))

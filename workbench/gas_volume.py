@@ -152,6 +152,7 @@ class GasVolume(Part):
             "temperature_k": self.level.temperature_k(pressure_pa, volume_m3, content_j_k),
             "gas_constant_j_kg_k": self.gas_constant_j_kg_k,
             "compliance_m3_pa": 0.0,
+            "line_share": 1.0,
         }
 
     def rates(self, now: Conditions, received: Received) -> dict[str, Expression]:

@@ -9,7 +9,7 @@ import casadi as ca
 from workbench.effect import Expression
 
 FADING = 1e-3  # of the command's range: a stuck band narrower than this fades out
-EDGE = 2e-3  # of the command's range: a spool that comes loose opens over this travel
+EDGE = 5e-3  # of the command's range: a spool that comes loose opens over this travel
 
 
 @dataclass(frozen=True)

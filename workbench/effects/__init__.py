@@ -5,6 +5,7 @@ from workbench.effects.bristle_friction import BristleFriction
 from workbench.effects.five_port_valve import FivePortValve
 from workbench.effects.forces import ConstantForce, EndCushion, EndStops, SpringForce, Weight
 from workbench.effects.leaks import ChamberLeak, PistonLeak
+from workbench.effects.line_delay import LineDelay
 from workbench.effects.sensor_offset import (
     PositionSensorOffset,
     PressureSensorOffset,
@@ -17,6 +18,7 @@ from workbench.effects.valve_command import (
     CommandDelay,
     DeadZone,
     PwmLag,
+    StuckBand,
     ValveLag,
     ValveOffset,
 )
@@ -34,6 +36,7 @@ CATALOGUE = (
     EndStops,
     FivePortValve,
     HeatedWall,
+    LineDelay,
     ParametricValve,
     PistonLeak,
     PositionSensorOffset,
@@ -43,6 +46,7 @@ CATALOGUE = (
     SensorScale,
     SpringForce,
     StribeckFriction,
+    StuckBand,
     SupplyDroop,
     ThreePortValve,
     ValveHysteresis,

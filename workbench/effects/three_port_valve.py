@@ -6,9 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import casadi as ca
-import numpy as np
 
-from workbench.air import IsoLaw, NozzleLaw, Path, line_share, path_between
+from workbench.air import IsoLaw, NozzleLaw, Path, path_between
 from workbench.effect import (
     Balance,
     Cause,
@@ -20,7 +19,6 @@ from workbench.effect import (
     form,
     strength,
 )
-from workbench.effects.line_delay import line_delay_cause, sent_late
 from workbench.spool import OpeningLaw, SmoothOpening, area_share, shut_while_stuck
 
 
@@ -163,7 +161,6 @@ class ThreePortValve(SpoolOpening):
             shown_by="the subsonic ends of filling and venting curves",
             source="paper 002 Eq. 3; physics.md section 6 (flow_b)",
         ),
-        line_delay_cause(),
     )
 
     flow_area_m2: Expression = form(25e-6, lower=1e-9, upper=1e-3, relative_deviation=0.05)
@@ -173,24 +170,18 @@ class ThreePortValve(SpoolOpening):
     leak_area_m2: Expression = strength(typical=1e-7, upper=5e-6)
     iso_share: Expression = strength(typical=1.0, upper=1.0)
     critical_ratio: Expression = form(0.3, lower=0.05, upper=0.6)
-    line_length_m: Expression = strength(typical=2.0, upper=10.0)
-    line_diameter_m: Expression = form(4e-3, lower=1e-3, upper=2e-2)
-
-    def resample(self, channel: str, values: np.ndarray, sample_time_s: float) -> np.ndarray:
-        if channel != f"{self.name}.pwm":
-            return values
-        return sent_late(values, self.line_length_m, sample_time_s)
 
     def terms(self, now: Conditions) -> Iterator[MassFlow]:
         gas, outside = now[self.chamber], now["atmosphere"]
         fill, vent = self.shares(now)
         charge = path_between(now["supply"], gas, gas.gas_constant_j_kg_k)
         outlet = path_between(gas, outside)
-        left = line_share(
-            self.line_length_m, self.line_diameter_m, gas.pressure_pa, gas.temperature_k
+        into_kg_s = gas.line_share * self._flow(
+            charge, fill * (1.0 - self.supply_restriction_share), +1
         )
-        into_kg_s = left * self._flow(charge, fill * (1.0 - self.supply_restriction_share), +1)
-        out_kg_s = left * self._flow(outlet, vent * (1.0 - self.exhaust_restriction_share), -1)
+        out_kg_s = gas.line_share * self._flow(
+            outlet, vent * (1.0 - self.exhaust_restriction_share), -1
+        )
         yield MassFlow(self.chamber, into_kg_s, charge.temperature_k)
         yield MassFlow("supply", -into_kg_s, charge.temperature_k)
         yield MassFlow(self.chamber, -out_kg_s, outlet.temperature_k)

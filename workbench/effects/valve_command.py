@@ -21,6 +21,7 @@ from workbench.effect import (
     strength,
 )
 from workbench.effects.line_delay import delayed
+from workbench.spool import shut_while_stuck
 
 FADING_V = 0.01  # half-width of a band below which its centre loses its meaning
 
@@ -205,3 +206,40 @@ class CommandDelay(Effect):
         if channel != self.signal:
             return values
         return delayed(values, float(self.delay_s), sample_time_s)
+
+
+@dataclass(frozen=True, kw_only=True)
+class StuckBand(Effect):
+    """The spool stays at its centre until a command below it has left a band, then comes loose.
+
+    u -> u_n   where u_n - band < u < u_n
+
+    The band is a share of the command's range ``span``; stand it behind the dead zone.
+
+    Source: paper 004 (event near 250 s) and interface.md section 6, for valves that act on two
+    chambers; the spool valve of the soft joint shuts its vent alone.
+    """
+
+    causes = (
+        Cause(
+            name="valve_stuck_band",
+            strength="band_share",
+            balance=Balance.VALVE,
+            drivers=("command just below centre",),
+            kinked=True,
+            shown_by="small commands to the side below centre",
+            source="paper 004, Fig. 8 near 250 s; physics.md sections 6 and 7",
+        ),
+    )
+
+    signal: str
+    neutral: float
+    span: float
+
+    band_share: Expression = strength(typical=0.03, upper=0.3)
+
+    def alter(self, signal: str, value: Expression, now: Conditions) -> Expression:
+        if signal != self.signal:
+            return value
+        below = ca.fmax(self.neutral - value, 0.0)
+        return value + below * shut_while_stuck(below / self.span, self.band_share)

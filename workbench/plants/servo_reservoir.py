@@ -16,9 +16,11 @@ from workbench.effects import (
     DeadZone,
     FivePortValve,
     HeatedWall,
+    LineDelay,
     PressureSensorOffset,
     SensorLag,
     SensorScale,
+    StuckBand,
     SupplyDroop,
     ValveHysteresis,
     ValveLag,
@@ -61,6 +63,7 @@ def servo_reservoir() -> Plant:
         ),
         effects=(
             CommandDelay(name="command_delay", signal=COMMAND),
+            LineDelay(name="line_delay", signal=COMMAND, chambers=("reservoir",)),
             ValveHysteresis(
                 name="valve_hysteresis", signal=COMMAND, span=RANGE_V, initial=CENTRE_V
             ),
@@ -73,6 +76,7 @@ def servo_reservoir() -> Plant:
                 neutral_v=CENTRE_V,
                 half_width_v=HALF_WIDTH_V,
             ),
+            StuckBand(name="valve_stuck_band", signal=COMMAND, neutral=CENTRE_V, span=RANGE_V),
             FivePortValve(
                 name="valve",
                 first="reservoir",

@@ -21,6 +21,7 @@ from workbench.effects import (
     BellowsCreep,
     ChamberLeak,
     CommandDelay,
+    LineDelay,
     PressureSensorOffset,
     PwmLag,
     SensorLag,
@@ -62,6 +63,7 @@ def soft_joint() -> Plant:
         ),
         effects=(
             CommandDelay(name="command_delay", signal=COMMAND),
+            LineDelay(name="line_delay", signal=COMMAND, chambers=("bellows",)),
             ValveHysteresis(name="valve_hysteresis", signal=COMMAND, span=1.0, initial=NEUTRAL),
             PwmLag(name="valve_lag", signal=COMMAND, initial_v=NEUTRAL),
             ThreePortValve(name="valve", chamber="bellows", overlap_share=OVERLAP),
