@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.integrate import Radau
 
-ABSOLUTE = {"m": 1e-9, "m_s": 1e-7, "pa": 0.1, "kg": 1e-11}
+ABSOLUTE = {"m": 1e-9, "m_s": 1e-7, "pa": 0.1, "kg": 1e-11, "j": 1e-6}
 BRISTLE_M = 1e-11
 
 
@@ -48,7 +48,8 @@ def _run(solver, states, first, last, sample_time_s):
 def _tolerances(model):
     units = (name.rpartition(".")[2].partition("_")[2] for name in model.states)
     values = [ABSOLUTE[unit] for unit in units]
-    values[model.states.index("friction.deflection_m")] = BRISTLE_M
+    if "friction.deflection_m" in model.states:
+        values[model.states.index("friction.deflection_m")] = BRISTLE_M
     return np.array(values)
 
 
