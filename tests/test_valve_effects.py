@@ -33,7 +33,8 @@ def run(plant, command, channel, start_pa=None):
     recording = Recording("run", DT, {channel: np.asarray(command, dtype=float)})
     x0 = np.array(plant.initial)
     if start_pa:
-        x0[: 1 + ("reservoir.mass_kg" in plant.state_list)] *= start_pa / x0[0]
+        gas = 2 if "reservoir.mass_kg" in plant.state_list else 1  # pressure and mass, or pressure
+        x0[:gas] *= start_pa / x0[0]
     return simulate(plant, recording, x0)
 
 
@@ -101,6 +102,31 @@ def test_restrictions_scale_the_flow_of_their_own_path_alone(share):
 
         assert flows[1][0] == pytest.approx((1 - share) * flows[0][0], rel=2e-2)
         assert flows[1][1] == pytest.approx(flows[0][1], rel=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "command_v", "pressure_pa", "expected"),
+    [
+        ("supply_restriction_share", 0.3, 10.0, 1.5e5, 0.7),
+        ("supply_restriction_share", 0.3, 0.0, 5e5, 1.0),
+        ("discharge_asymmetry", 0.15, 10.0, 1.5e5, 1.15),
+        ("discharge_asymmetry", 0.15, 0.0, 5e5, 0.85),
+        ("area_exponent_change", -0.6, 7.685, 1.5e5, 0.5 / (1 - 0.5**1.6)),  # s = 0.5
+        ("area_exponent_change", -0.6, 10.0, 1.5e5, 1.0),
+        ("critical_ratio_change", -0.15, 10.0, 2e5, 0.993938),
+        ("critical_ratio_change", -0.15, 10.0, 0.8 * 7e5, 0.912522),
+    ],
+)
+def test_the_flaws_of_the_five_port_valve_scale_the_flow_they_are_meant_to(
+    field, value, command_v, pressure_pa, expected
+):
+    """Ratio of the pressure rates of the reservoir, without leak and heat."""
+    still = {"valve__leak_area_m2": 0.0, "wall_heat__coefficient_w_m2_k": 0.0}
+    x = np.array([pressure_pa, pressure_pa * 0.344e-3 / (288.0 * 293.15)])
+    bare, flawed = tank(**still), tank(**still, **{f"valve__{field}": value})
+    rates = [float(q.model.f(x, command_v, [], q.nominal[2])[0][0]) for q in (bare, flawed)]
+
+    assert rates[1] / rates[0] == pytest.approx(expected, rel=1e-5)
 
 
 def test_discharge_asymmetry_follows_the_direction_of_the_flow():
