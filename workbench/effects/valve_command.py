@@ -95,14 +95,14 @@ class ValveLag(Effect):
     def alter(self, signal: str, value: Expression, now: Conditions) -> Expression:
         if signal != self.signal:
             return value
-        now.place(f"{self.name}.entering", value)
+        now.place(f"{self.name}.entering_v", value)
         share = 1.0 - ca.exp(-self.time_constant_s / self.shortest_s)
         return value + share * (now.read(f"{self.name}.{self.lagged}") - value)
 
     def rates(self, now: Conditions, received: Received) -> dict[str, Expression]:
         shortest_s, lagged = self.shortest_s, now.read(f"{self.name}.{self.lagged}")
         effective_s = self.time_constant_s + shortest_s * ca.exp(-self.time_constant_s / shortest_s)
-        return {self.lagged: (now[self.name].entering - lagged) / effective_s}
+        return {self.lagged: (now[self.name].entering_v - lagged) / effective_s}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -65,6 +65,7 @@ class ValveHysteresis(Effect):
             return value
         play, left = self.play_share * self.span, now[self.name].left_share * self.span
         held = ca.fmin(ca.fmax(left, value - play), value + play)
+        now.place(f"{self.name}.entering_share", value / self.span)
         now.place(f"{self.name}.moved_share", held / self.span)
         return held
 
