@@ -105,7 +105,9 @@ class DesignModel:
         inside = [name for name in model.states if name not in self.states]
         old = ca.vertcat(*(x[model.states.index(name)] for name in inside), ca.SX(0, 1))
         new = ca.vertcat(*(_stand_in(self.plant, name) for name in inside), ca.SX(0, 1))
-        reduced = ca.substitute([x, model.rates, model.outputs], [old], [new])
+        reduced = [x, model.rates, model.outputs]
+        for _ in range(2):  # what stands in for a lag may hold the play before it
+            reduced = ca.substitute(reduced, [old], [new])
         return tuple(ca.substitute(reduced, [d, p], [ca.DM(d_nominal), ca.DM(p_nominal)]))
 
     @cached_property

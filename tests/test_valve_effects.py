@@ -6,6 +6,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from linearize.reduction import design_model
 from workbench.effects.line_delay import SOUND_M_S
 from workbench.gas_volume import PolytropicLevel
 from workbench.plants import PLANTS
@@ -233,6 +234,20 @@ def test_a_spool_lag_on_a_pwm_command_is_first_order():
     assert result["valve_lag.lagged_share"] == pytest.approx(
         0.9 - 0.4 * np.exp(-time_s / 0.02), abs=1e-4
     )
+
+
+def test_a_design_does_without_play_and_sensor_lag_even_before_a_spool_lag():
+    values = {
+        "sensor_lag@chamber_a.pressure.lagged_share": 1.0,
+        "valve_hysteresis.play_share": 0.02,
+    }
+    flawed = PLANTS["servo_drive"]().with_values(values | {"valve_lag.time_constant_s": 0.01})
+    design = design_model(flawed)
+
+    assert set(design.states) == set(design_model(PLANTS["servo_drive"]()).states)
+    assert {"valve_hysteresis", "sensor_lag@chamber_a.pressure"} <= {
+        each.what for each in design.left_out
+    }
 
 
 def polytropic(drive):
