@@ -16,11 +16,14 @@ import casadi as ca
 import numpy as np
 
 from workbench.effects.bristle_friction import BristleFriction
+from workbench.effects.sensor_response import SensorLag
 from workbench.effects.supply_droop import SupplyDroop
 from workbench.effects.valve_command import CommandDelay, DeadZone, ValveLag, ValveOffset
+from workbench.effects.valve_hysteresis import ValveHysteresis
 from workbench.plant import Plant
 
-INSIDE = (BristleFriction, SupplyDroop, ValveLag)  # effects whose states a design does without
+# Effects whose states a design does without.
+INSIDE = (BristleFriction, SensorLag, SupplyDroop, ValveHysteresis, ValveLag)
 
 
 @dataclass(frozen=True)
@@ -102,7 +105,9 @@ class DesignModel:
         inside = [name for name in model.states if name not in self.states]
         old = ca.vertcat(*(x[model.states.index(name)] for name in inside), ca.SX(0, 1))
         new = ca.vertcat(*(_stand_in(self.plant, name) for name in inside), ca.SX(0, 1))
-        reduced = ca.substitute([x, model.rates, model.outputs], [old], [new])
+        reduced = [x, model.rates, model.outputs]
+        for _ in range(2):  # what stands in for a lag may hold the play before it
+            reduced = ca.substitute(reduced, [old], [new])
         return tuple(ca.substitute(reduced, [d, p], [ca.DM(d_nominal), ca.DM(p_nominal)]))
 
     @cached_property
@@ -141,6 +146,11 @@ def _stand_in(plant: Plant, state: str) -> ca.SX:
     member, _, quantity = state.rpartition(".")
     if quantity == "lagged_v":
         return plant.model.conditions[member].entering_v
+    if quantity == "left_share":
+        return plant.model.conditions[member].entering_share
+    owner = next(m for m in plant.members if m.name == member)
+    if isinstance(owner, SensorLag):
+        return plant.model.conditions.read(owner.signal) / owner.unit
     if quantity != "mass_kg":
         return ca.SX(0.0)
     gas = plant.model.conditions[member]
@@ -168,5 +178,9 @@ def _left_out(plant: Plant) -> Iterator[LeftOut]:
             yield LeftOut(
                 member.name, "no lag", "inside the dead zone's undoing; margins must hold it"
             )
+        elif isinstance(member, ValveHysteresis):
+            yield LeftOut(member.name, "no play", "a play has no linear model")
+        elif isinstance(member, SensorLag):
+            yield LeftOut(member.name, "no lag", "the margins must hold it")
         elif isinstance(member, CommandDelay):
             yield LeftOut(member.name, "no delay", "acts on samples; the margins must hold it")

@@ -13,6 +13,7 @@ ABSOLUTE = {
     "pa": 0.1,
     "kg": 1e-11,
     "a": 1e-7,
+    "j": 1e-6,
 }
 BRISTLE_M = 1e-11
 

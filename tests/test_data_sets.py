@@ -34,7 +34,7 @@ def test_channels_have_known_names_and_units_on_a_uniform_grid(data_set):
         known = channel_names(rig.plant).values()
         assert set(recording.channels) <= set(known)
         assert all(si_unit(name) for name in recording.channels)
-        assert 0.0 < recording.sample_time_s < 0.1
+        assert 0.0 < recording.sample_time_s < 0.2
         assert {len(values) for values in recording.channels.values()} == {len(recording)}
         assert recording.starts[0] == 0
         assert (np.diff((*recording.starts, len(recording))) > 0).all()

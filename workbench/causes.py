@@ -7,11 +7,12 @@ from workbench.effects import CATALOGUE
 from workbench.floating_piston import ControlChamber
 from workbench.parts import PARTS
 from workbench.plant import Plant
+from workbench.vessel import Bellows
 
 
 def all_causes() -> dict[str, Cause]:
     """Causes by public name: those of the catalogue, and those that sit on parts (a mass)."""
-    kinds = (*CATALOGUE, *PARTS, ControlChamber)
+    kinds = (*CATALOGUE, *PARTS, ControlChamber, Bellows)
     return {cause.name: cause for kind in kinds for cause in kind.causes}
 
 

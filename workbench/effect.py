@@ -48,11 +48,6 @@ class Conditions(dict[str, SimpleNamespace]):
         part, _, quantity = name.rpartition(".")
         return getattr(self[part], quantity)
 
-    def holds(self, name: str) -> bool:
-        """True when the quantity has been set."""
-        part, _, quantity = name.rpartition(".")
-        return part in self and hasattr(self[part], quantity)
-
 
 @dataclass(frozen=True)
 class Term:
@@ -85,8 +80,7 @@ class MassFlow(Term):
     temperature_k: Expression
 
 
-Received = Callable[[str], list[Term]]
-"""The terms that a balance received, by its name."""
+Received = Callable[[str], list[Term]]  # the terms that a balance received, by its name
 
 
 @dataclass(frozen=True)

@@ -5,17 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from math import pi
-from types import SimpleNamespace
 
 import casadi as ca
 import numpy as np
 
-from workbench.air import (
-    GAS_CONSTANT_J_KG_K,
-    HEAT_CAPACITY_RATIO,
-    LOWEST_PRESSURE_PA,
-    LOWEST_TEMPERATURE_K,
-)
 from workbench.effect import (
     AddedMass,
     Balance,
@@ -23,9 +16,7 @@ from workbench.effect import (
     Conditions,
     Expression,
     Force,
-    HeatFlow,
     Kind,
-    MassFlow,
     Part,
     Received,
     State,
@@ -33,13 +24,7 @@ from workbench.effect import (
     form,
     strength,
 )
-
-LOWEST_MASS_KG = 1e-9
-
-
-def total(terms: list[Term], kind: type[Term]) -> Expression:
-    """Sum of the values of one kind of term."""
-    return sum(term.value for term in terms if isinstance(term, kind))
+from workbench.gas_volume import GasVolume, total
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -154,17 +139,17 @@ class PressureFace(Part):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Chamber(Part):
+class Chamber(GasVolume):
     """A gas volume closed by a moving body, with its pressure and its mass of gas as states.
 
-    V dp/dt = kappa R sum(mdot T) - kappa p dV/dt + (kappa - 1) sum(Q)
-    dm/dt   = sum(mdot),     T = p V / (m R)
-    V       = V_dead (1 + e) + A l,   l = x - x_0 (side +1)   or   x_0 + L - x (side -1)
+    V = V_dead (1 + e) + A l,   l = x - x_0 (side +1)   or   x_0 + L - x (side -1)
 
     The stroke of length L begins at x_0.
 
-    Source: paper 002 Eqs. 4 and 5 in the (p, m) form of physics.md 1.2 level 1, which conserves
-    mass by construction; dead volume by erratum E002-8.
+    Surface of the wall: 2 A + pi d l, with d the diameter and l the length of the chamber.
+
+    Source: paper 002 Eqs. 4 and 5, in the balance of :class:`GasVolume`; dead volume by erratum
+    E002-8.
     """
 
     causes = (
@@ -187,15 +172,7 @@ class Chamber(Part):
     lower_m: Expression = form(0.0, lower=-10.0, upper=10.0)
     dead_volume_m3: Expression = form(1e-5, lower=1e-9, relative_deviation=0.05)
     dead_volume_change: Expression = strength(typical=0.5, lower=-0.87, upper=2.0)
-    gas_constant_j_kg_k: float = GAS_CONSTANT_J_KG_K
-    initial_pressure_pa: float = 1e5
-    initial_temperature_k: float = 293.15
     initial_position_m: float = 0.0
-
-    def states(self) -> Iterator[State]:
-        filled_kg = self.filled_mass_kg(self.initial_pressure_pa, *self.initial_positions_m)
-        yield State("pressure_pa", self.initial_pressure_pa, scale=1e5, tolerance=20.0)
-        yield State("mass_kg", filled_kg, scale=1e-4, tolerance=1e-8)
 
     @property
     def bodies(self) -> tuple[str, ...]:
@@ -207,10 +184,8 @@ class Chamber(Part):
         """Where the bodies are at the start."""
         return (self.initial_position_m,)
 
-    def filled_mass_kg(self, pressure_pa: Expression, *positions_m: Expression) -> Expression:
-        """Mass of gas at a pressure and the initial temperature, the bodies at ``positions_m``."""
-        gas_j_kg = self.gas_constant_j_kg_k * self.initial_temperature_k
-        return pressure_pa * self.volume_m3(*positions_m) / gas_j_kg
+    def initial_volume_m3(self) -> Expression:
+        return self.volume_m3(*self.initial_positions_m)
 
     def length_m(self, position_m: Expression) -> Expression:
         """Length of the chamber with the body at ``position_m``."""
@@ -222,57 +197,29 @@ class Chamber(Part):
         dead_m3 = self.dead_volume_m3 * (1.0 + self.dead_volume_change)
         return dead_m3 + self.area_m2 * self.length_m(position_m)
 
-    def temperature_k(self, own: SimpleNamespace, volume_m3: Expression) -> Expression:
-        """T = p V / (m R), of the chamber's own states."""
-        pressure_pa = ca.fmax(own.pressure_pa, LOWEST_PRESSURE_PA)
-        content_j_k = ca.fmax(own.mass_kg, LOWEST_MASS_KG) * self.gas_constant_j_kg_k
-        return ca.fmax(pressure_pa * volume_m3 / content_j_k, LOWEST_TEMPERATURE_K)
-
-    @property
-    def balance_exponent(self) -> Expression:
-        """What stands before enthalpy and work: kappa; 1 where the gas keeps its temperature."""
-        return HEAT_CAPACITY_RATIO
-
     def guess(self, seen: Mapping[str, np.ndarray]) -> dict[str, tuple[np.ndarray | float, float]]:
         pressure_pa = seen.get(f"{self.name}.pressure_pa")
         positions_m = [seen.get(f"{body}.position_m") for body in self.bodies]
         if pressure_pa is None or any(position_m is None for position_m in positions_m):
             return {}
-        filled_kg = self.filled_mass_kg(pressure_pa, *positions_m)
-        return {
-            "pressure_pa": (pressure_pa, 2e3),
-            "mass_kg": (filled_kg, 0.05 * float(np.median(filled_kg))),
-        }
+        return self.guessed(pressure_pa, self.volume_m3(*positions_m))
 
     def derive(self, now: Conditions) -> dict[str, Expression]:
-        own, body = now[self.name], now[self.body]
+        body = now[self.body]
         positions_m = (now[name].position_m for name in self.bodies)
         dead_m3 = self.dead_volume_m3 * (1.0 + self.dead_volume_change)
         volume_m3 = ca.fmax(self.volume_m3(*positions_m), 0.1 * dead_m3)
         length_m = self.length_m(body.position_m)
-        diameter_m = ca.sqrt(4.0 / pi * self.area_m2)
-        return {
-            "volume_m3": volume_m3,
+        around_m = pi * ca.sqrt(4.0 / pi * self.area_m2)
+        return self.gas(now, volume_m3) | {
             "volume_rate_m3_s": self.side * self.area_m2 * body.velocity_m_s,
-            "temperature_k": self.temperature_k(own, volume_m3),
             "length_m": length_m,
             "area_m2": self.area_m2,
-            "surface_m2": 2.0 * self.area_m2 + pi * diameter_m * ca.fmax(length_m, 0.0),
-            "gas_constant_j_kg_k": self.gas_constant_j_kg_k,
+            "surface_m2": 2.0 * self.area_m2 + around_m * ca.fmax(length_m, 0.0),
         }
 
     def terms(self, now: Conditions) -> Iterator[Term]:
         yield Force(self.body, self.side * self.area_m2 * now[self.name].pressure_pa)
-
-    def rates(self, now: Conditions, received: Received) -> dict[str, Expression]:
-        own, got, k = now[self.name], received(self.name), self.balance_exponent
-        carried = sum(t.value * t.temperature_k for t in got if isinstance(t, MassFlow))
-        energy_w = (
-            k * self.gas_constant_j_kg_k * carried
-            - k * own.pressure_pa * own.volume_rate_m3_s
-            + (HEAT_CAPACITY_RATIO - 1.0) * total(got, HeatFlow)
-        )
-        return {"pressure_pa": energy_w / own.volume_m3, "mass_kg": total(got, MassFlow)}
 
 
 PARTS = (Supply, Atmosphere, Body, HeldRod, PressureFace, Chamber)

@@ -7,26 +7,40 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from workbench.air import GAS_CONSTANT_J_KG_K, FlowLaw, IsoLaw, NozzleLaw, Path, path_between
+from workbench.air import (
+    GAS_CONSTANT_J_KG_K,
+    FlowLaw,
+    IsoLaw,
+    NozzleLaw,
+    Path,
+    path_between,
+)
 from workbench.effect import (
     Balance,
     Cause,
     Conditions,
     Effect,
     Expression,
+    Kind,
     MassFlow,
     form,
     strength,
 )
+from workbench.spool import area_share
 
 
 @dataclass(frozen=True, kw_only=True)
 class FivePortValve(Effect):
     """Spool above centre: ``first`` is charged and ``second`` exhausted; below, the reverse.
 
+    Without a ``second`` chamber that port is blocked.
+
     s        = (u - u_c) / (10 V - u_c)  above,   (u_c - u) / u_c  below the centre
     A_path   = A_max f [1 - (1 - s)^e],  f = f_supply, or f_exhaust (1 - share)
     mdot     = C_d A_path C_chk p_u / sqrt(T_u) psi(p_d / p_u)  +  leak
+
+    e is ``area_exponent`` plus its change, and both critical ratios shift together.  C_d counts
+    times 1 + a where gas enters a chamber and 1 - a where it leaves, a ``discharge_asymmetry``.
 
     The dead zone alters the command before it comes here; ``underlap_v`` opens every path that
     much earlier, so that near the centre all four are open at once.  The closed-centre leak is one
@@ -64,16 +78,55 @@ class FivePortValve(Effect):
             shown_by="slow voltage ramp through the centre",
             source="paper 000, method 3; physics.md 2.1 two-flow underlap",
         ),
+        Cause(
+            name="supply_restriction",
+            strength="supply_restriction_share",
+            balance=Balance.FLOW,
+            drivers=("command", "charging chamber pressure"),
+            shown_by="charging from ambient at several openings",
+            source="interface.md section 6 (supply areas x (1 - share))",
+        ),
+        Cause(
+            name="discharge_asymmetry",
+            strength="discharge_asymmetry",
+            balance=Balance.FLOW,
+            drivers=("direction of flow",),
+            shown_by="charging and exhausting between the same pressures",
+            source="papers 000, 004; physics.md section 6 (cd_asymmetry)",
+        ),
+        Cause(
+            name="area_shape",
+            strength="area_exponent_change",
+            balance=Balance.FLOW,
+            drivers=("command at mid opening",),
+            kind=Kind.PARAMETER,
+            held="area_exponent",
+            shown_by="steps to several openings",
+            source="papers 000, 002; physics.md section 6 (area_shape)",
+        ),
+        Cause(
+            name="flow_shape",
+            strength="critical_ratio_change",
+            balance=Balance.FLOW,
+            drivers=("pressure ratio",),
+            kind=Kind.PARAMETER,
+            shown_by="the subsonic ends of charging and exhausting curves",
+            source="paper 002 Eq. 3; physics.md section 6 (flow_b)",
+        ),
     )
 
     first: str
-    second: str
+    second: str | None = None
     gas_constant_j_kg_k: float = GAS_CONSTANT_J_KG_K
 
     flow_area_m2: Expression = form(1e-5, lower=1e-9, upper=1e-3, relative_deviation=0.05)
     exhaust_restriction_share: Expression = strength(typical=0.5, upper=0.9)
     leak_area_m2: Expression = strength(typical=2e-7, upper=5e-6)
     underlap_v: Expression = strength(typical=0.3, upper=1.5, deviation=0.02)
+    supply_restriction_share: Expression = strength(typical=0.5, upper=0.9)
+    discharge_asymmetry: Expression = strength(typical=0.15, lower=-0.5, upper=0.5)
+    area_exponent_change: Expression = strength(typical=0.6, lower=-0.9, upper=1.5)
+    critical_ratio_change: Expression = strength(typical=-0.15, lower=-0.3, upper=0.15)
 
     discharge_coefficient: Expression = form(0.5513, lower=0.1, upper=1.0)
     supply_fraction: Expression = form(0.80, lower=0.05, upper=1.5)
@@ -96,30 +149,39 @@ class FivePortValve(Effect):
         forward = self._area_m2(offset_v, self.full_v - self.centre_v)
         reverse = self._area_m2(-offset_v, self.centre_v)
         yield from self._port(self.first, forward, reverse, now)
-        yield from self._port(self.second, reverse, forward, now)
+        if self.second is not None:
+            yield from self._port(self.second, reverse, forward, now)
 
     def _area_m2(self, offset_v: Expression, range_v: Expression) -> Expression:
         """Effective area of a path, without its fraction, at an offset towards its own side."""
         opening = ca.fmax(offset_v + self.underlap_v, 0.0) / (range_v + self.underlap_v)
-        law = 1.0 - ca.fmax(1.0 - opening, 1e-12) ** self.area_exponent
-        return self.discharge_coefficient * self.flow_area_m2 * law
+        share = area_share(opening, self.area_exponent + self.area_exponent_change)
+        return self.discharge_coefficient * self.flow_area_m2 * share
 
     def _port(
         self, chamber: str, charging_m2: Expression, exhausting_m2: Expression, now: Conditions
     ) -> Iterator[MassFlow]:
         gas, supply, outside = now[chamber], now["supply"], now["atmosphere"]
-        inlet = IsoLaw(self.supply_critical_ratio, self.cracking_ratio, self.subsonic_index)
-        outlet = IsoLaw(self.exhaust_critical_ratio, self.cracking_ratio, self.subsonic_index)
-        share = self.exhaust_fraction * (1.0 - self.exhaust_restriction_share)
+        inlet, outlet = (
+            IsoLaw(b + self.critical_ratio_change, self.cracking_ratio, self.subsonic_index)
+            for b in (self.supply_critical_ratio, self.exhaust_critical_ratio)
+        )
+        charging_m2 *= self.supply_fraction * (1.0 - self.supply_restriction_share)
+        exhausting_m2 *= self.exhaust_fraction * (1.0 - self.exhaust_restriction_share)
         charge = path_between(supply, gas, self.gas_constant_j_kg_k)
         vent = path_between(gas, outside)
-        into_kg_s = self._flow_kg_s(charge, charging_m2 * self.supply_fraction, inlet)
-        out_kg_s = self._flow_kg_s(vent, exhausting_m2 * share, outlet)
+        into_kg_s = gas.line_share * self._flow_kg_s(charge, charging_m2, inlet, +1)
+        out_kg_s = gas.line_share * self._flow_kg_s(vent, exhausting_m2, outlet, -1)
         yield MassFlow(chamber, into_kg_s, charge.temperature_k)
         yield MassFlow("supply", -into_kg_s, charge.temperature_k)
         yield MassFlow(chamber, -out_kg_s, vent.temperature_k)
 
-    def _flow_kg_s(self, path: Path, area_m2: Expression, law: FlowLaw) -> Expression:
-        """Flow through the controlled hole and through the closed-centre leak beside it."""
+    def _flow_kg_s(self, path: Path, area_m2: Expression, law: FlowLaw, side: int) -> Expression:
+        """Flow through the controlled hole and through the closed-centre leak beside it.
+
+        ``side`` is +1 where the path's forward direction enters the chamber.
+        """
+        entering = side * (2.0 * path.forward - 1.0)
+        area_m2 *= 1.0 + self.discharge_asymmetry * entering
         holes_m2 = area_m2 * law(path.ratio) + self.leak_area_m2 * NozzleLaw()(path.ratio)
         return holes_m2 * path.choked_kg_s_m2

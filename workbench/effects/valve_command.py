@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 import casadi as ca
 import numpy as np
@@ -20,6 +21,7 @@ from workbench.effect import (
     strength,
 )
 from workbench.effects.timing import Timing
+from workbench.spool import shut_while_stuck
 
 FADING_V = 0.01  # half-width of a band below which its centre loses its meaning
 
@@ -79,27 +81,39 @@ class ValveLag(Effect):
     )
 
     signal: str
+    lagged: ClassVar[str] = "lagged_v"
     initial_v: float = 5.0
     time_constant_s: Expression = strength(typical=20e-3, upper=0.2)
     shortest_s: Expression = form(0.5e-3, lower=1e-4, upper=1e-2)
 
     def states(self) -> Iterator[State]:
-        yield State("lagged_v", initial=self.initial_v, scale=1.0)
+        yield State(self.lagged, initial=self.initial_v, scale=1.0)
 
     def guess(self, seen: Mapping[str, np.ndarray]) -> dict[str, tuple[np.ndarray | float, float]]:
-        return {"lagged_v": (seen[self.signal], 0.1)} if self.signal in seen else {}
+        return {self.lagged: (seen[self.signal], 0.1)} if self.signal in seen else {}
 
     def alter(self, signal: str, value: Expression, now: Conditions) -> Expression:
         if signal != self.signal:
             return value
         now.place(f"{self.name}.entering_v", value)
         share = 1.0 - ca.exp(-self.time_constant_s / self.shortest_s)
-        return value + share * (now[self.name].lagged_v - value)
+        return value + share * (now.read(f"{self.name}.{self.lagged}") - value)
 
     def rates(self, now: Conditions, received: Received) -> dict[str, Expression]:
-        own, shortest_s = now[self.name], self.shortest_s
+        shortest_s, lagged = self.shortest_s, now.read(f"{self.name}.{self.lagged}")
         effective_s = self.time_constant_s + shortest_s * ca.exp(-self.time_constant_s / shortest_s)
-        return {"lagged_v": (own.entering_v - own.lagged_v) / effective_s}
+        return {self.lagged: (now[self.name].entering_v - lagged) / effective_s}
+
+
+@dataclass(frozen=True, kw_only=True)
+class PwmLag(ValveLag):
+    """The same lag on a command from 0 to 1; ``initial_v`` is such a command too.
+
+    Source: physics.md section 6 (valve_dynamics).
+    """
+
+    lagged: ClassVar[str] = "lagged_share"
+    initial_v: float = 0.5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -190,3 +204,40 @@ class CommandDelay(Timing):
 
     def sent_at_s(self, time_s: np.ndarray) -> np.ndarray:
         return time_s - float(self.delay_s)
+
+
+@dataclass(frozen=True, kw_only=True)
+class StuckBand(Effect):
+    """The spool stays at its centre until a command below it has left a band, then comes loose.
+
+    u -> u_n   where u_n - band < u < u_n
+
+    The band is a share of the command's range ``span``; stand it behind the dead zone.
+
+    Source: paper 004 (event near 250 s) and interface.md section 6, for valves that act on two
+    chambers; the spool valve of the soft joint shuts its vent alone.
+    """
+
+    causes = (
+        Cause(
+            name="valve_stuck_band",
+            strength="band_share",
+            balance=Balance.VALVE,
+            drivers=("command just below centre",),
+            kinked=True,
+            shown_by="small commands to the side below centre",
+            source="paper 004, Fig. 8 near 250 s; physics.md sections 6 and 7",
+        ),
+    )
+
+    signal: str
+    neutral: float
+    span: float
+
+    band_share: Expression = strength(typical=0.03, upper=0.3)
+
+    def alter(self, signal: str, value: Expression, now: Conditions) -> Expression:
+        if signal != self.signal:
+            return value
+        below = ca.fmax(self.neutral - value, 0.0)
+        return value + below * shut_while_stuck(below / self.span, self.band_share)

@@ -15,6 +15,8 @@ from workbench.effect import (
     Effect,
     Expression,
     HeatFlow,
+    Received,
+    State,
     form,
     strength,
 )
@@ -49,11 +51,15 @@ class ConstantWallHeat(Effect):
     coefficient_w_m2_k: Expression = strength(typical=50.0, upper=1e3)
 
     def terms(self, now: Conditions) -> Iterator[HeatFlow]:
-        wall_k = now[self.wall].temperature_k
+        wall_k = self.wall_temperature_k(now)
         for chamber in self.chambers:
             gas = now[chamber]
             conductance_w_k = self.coefficient_w_m2_k * gas.surface_m2 * self.relative(gas)
             yield HeatFlow(chamber, conductance_w_k * (wall_k - gas.temperature_k))
+
+    def wall_temperature_k(self, now: Conditions) -> Expression:
+        """What the gas gives its heat to."""
+        return now[self.wall].temperature_k
 
     def relative(self, gas: SimpleNamespace) -> Expression:
         """The coefficient at this state of the gas, relative to the parameter."""
@@ -78,3 +84,43 @@ class WallHeat(ConstantWallHeat):
         load = ca.fmax(gas.pressure_pa, 0.0) * gas.temperature_k
         load /= self.reference_pressure_pa * self.reference_temperature_k
         return ca.sqrt(load + 1e-12)
+
+
+@dataclass(frozen=True, kw_only=True)
+class HeatedWall(WallHeat):
+    """The same with a wall that the gas warms up or cools down.
+
+    C_w dT_w/dt = -Q + h (T_amb - T_w)   as   T_w = T_amb + E/C_w,   dE/dt = -Q - E/tau
+
+    E is the heat stored in the wall and tau = C_w/h its time constant towards ambient.  The
+    strength is 1/C_w: at zero the wall keeps its temperature whatever it takes up.
+
+    Source: physics.md section 6 (wall_temperature), written with E so that the null is regular.
+    """
+
+    causes = (
+        *WallHeat.causes,
+        Cause(
+            name="wall_temperature",
+            strength="heating_k_j",
+            forms=("wall_time_s",),
+            shapes={"wall_time_s": (30.0, 200.0)},
+            balance=Balance.ENERGY,
+            drivers=("heat given off so far",),
+            shown_by="fill, close the valve, log the pressure for minutes",
+            source="physics.md section 6 (wall_temperature)",
+        ),
+    )
+
+    heating_k_j: Expression = strength(typical=0.02, upper=2.0)
+    wall_time_s: Expression = form(100.0, lower=2.0, upper=1e4)
+
+    def states(self) -> Iterator[State]:
+        yield State("stored_j", initial=0.0, scale=10.0)
+
+    def wall_temperature_k(self, now: Conditions) -> Expression:
+        return now[self.wall].temperature_k + self.heating_k_j * now[self.name].stored_j
+
+    def rates(self, now: Conditions, received: Received) -> dict[str, Expression]:
+        given_w = sum(term.value for term in self.terms(now))
+        return {"stored_j": -given_w - now[self.name].stored_j / self.wall_time_s}

@@ -6,7 +6,8 @@ the energy balance read backwards, sample by sample,
 
     kappa R T_in mdot = V dp/dt + kappa p dV/dt - (kappa - 1) Q,    T_in = T_s or the gas's own
 
-with recorded p and V and the plant's own heat flow Q.  Errors fade with the wall's time constant.
+with recorded p and V and the plant's own heat flow Q; without a supply T_s is that of the
+atmosphere.  Errors fade with the wall's time constant.
 
 Short holes in a channel are bridged by straight lines.  In long ones, and next to them, nothing is
 known of any state: they keep their guess with the deviation of a state that is not measured, and
@@ -23,7 +24,7 @@ import casadi as ca
 import numpy as np
 
 from workbench.air import HEAT_CAPACITY_RATIO
-from workbench.parts import Chamber
+from workbench.gas_volume import GasVolume
 from workbench.plant import Plant
 from workbench.recording import Recording
 
@@ -53,8 +54,9 @@ def guessed_states(plant: Plant, recording: Recording) -> np.ndarray:
     if not rows:
         return np.zeros((2, 0, n))
     states = np.stack(rows, axis=1)
-    for part in plant.parts:
-        if isinstance(part, Chamber) and f"{part.name}.pressure_pa" in seen:
+    weighed = [p for p in plant.parts if isinstance(p, GasVolume) and p.level.counts_mass]
+    for part in weighed:
+        if f"{part.name}.pressure_pa" in seen:
             _follow_gas(plant, part, recording, states, blind)
     return states
 
@@ -99,7 +101,7 @@ def slope(values: np.ndarray, sample_time_s: float, starts: tuple[int, ...]) -> 
 
 
 def _follow_gas(
-    plant: Plant, chamber: Chamber, recording: Recording, states: np.ndarray, blind: np.ndarray
+    plant: Plant, chamber: GasVolume, recording: Recording, states: np.ndarray, blind: np.ndarray
 ) -> None:
     """Write the followed mass of one chamber, and its deviation, into the guessed states."""
     model, dt = plant.model, recording.sample_time_s
@@ -150,11 +152,12 @@ def _folded(
     return found[:n]
 
 
-def _flow_from_energy(plant: Plant, chamber: Chamber, row: int) -> ca.Function:
+def _flow_from_energy(plant: Plant, chamber: GasVolume, row: int) -> ca.Function:
     """(mass, x, dp/dt, u, d, p, dt) -> mass one sample later, by the module's equation."""
     model, kappa = plant.model, HEAT_CAPACITY_RATIO
     x, u, d, p = model.symbols
-    own, supply = model.conditions[chamber.name], model.conditions["supply"]
+    own, around = model.conditions[chamber.name], model.conditions
+    source = around["supply" if "supply" in around else "atmosphere"]
     heat_w = sum(
         value
         for (_, kind, balance), value in model.flows.items()
@@ -163,7 +166,7 @@ def _flow_from_energy(plant: Plant, chamber: Chamber, row: int) -> ca.Function:
     mass, rate, dt = ca.SX.sym("mass"), ca.SX.sym("rate"), ca.SX.sym("dt")
     energy_w = own.volume_m3 * rate + kappa * own.pressure_pa * own.volume_rate_m3_s
     energy_w -= (kappa - 1.0) * heat_w
-    source_k = ca.if_else(energy_w > 0, supply.temperature_k, own.temperature_k)
+    source_k = ca.if_else(energy_w > 0, source.temperature_k, own.temperature_k)
     later = x[row] + dt * energy_w / (kappa * chamber.gas_constant_j_kg_k * source_k)
     later = ca.substitute(later, x[row], mass)
     return ca.Function("gas", [mass, x, rate, u, d, p, dt], [later])

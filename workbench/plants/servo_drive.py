@@ -14,6 +14,9 @@ Values are from the paper's list of constants and Tables 3 to 6, except where ma
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
+from workbench.effect import Effect
 from workbench.effects import (
     BristleFriction,
     ChamberLeak,
@@ -23,17 +26,23 @@ from workbench.effects import (
     EndCushion,
     EndStops,
     FivePortValve,
+    LineDelay,
     PistonLeak,
     PositionSensorOffset,
     PressureSensorOffset,
+    SensorLag,
+    SensorScale,
     SpringForce,
+    StuckBand,
     SupplyDroop,
+    ValveHysteresis,
     ValveLag,
     ValveOffset,
     WallHeat,
 )
 from workbench.parts import Atmosphere, Body, Chamber, Supply
 from workbench.plant import Plant, Signal
+from workbench.units import public_name
 
 GAS_CONSTANT_J_KG_K = 288.0
 STROKE_M = 0.290
@@ -42,10 +51,13 @@ SUPPLY_PA = 7.0e5
 ATMOSPHERE_PA = 1.0e5
 ROOM_K = 293.15
 REST_PA = 5.65e5  # P_0 of the paper
+RANGE_V = 10.0
 CENTRE_V = 4.95  # (zms + zmd) / 2
 HALF_WIDTH_V = 0.42  # (zmd - zms) / 2
 BRISTLE_STIFFNESS_N_M = 1.12e6
 BRISTLE_DAMPING_N_S_M = 50.0
+FLOW_AREA_M2 = 2.8274e-5
+LEAK_AREA_M2 = 8e-8
 START_M = STROKE_M / 2
 
 COMMAND = "valve.command_v"
@@ -74,6 +86,36 @@ def _friction() -> BristleFriction:
     )
 
 
+def _command_path() -> tuple[Effect, ...]:
+    """What happens to a command before it opens the valve, in this order."""
+    return (
+        CommandDelay(name="command_delay", signal=COMMAND),
+        LineDelay(name="line_delay", signal=COMMAND, chambers=("chamber_a", "chamber_b")),
+        ValveHysteresis(name="valve_hysteresis", signal=COMMAND, span=RANGE_V, initial=CENTRE_V),
+        ValveLag(name="valve_lag", signal=COMMAND, initial_v=CENTRE_V),
+        ValveOffset(name="valve_offset", signal=COMMAND),
+        DeadZone(
+            name="valve_dead_zone",
+            signal=COMMAND,
+            centre_v=CENTRE_V,
+            neutral_v=CENTRE_V,
+            half_width_v=HALF_WIDTH_V,
+        ),
+        StuckBand(name="valve_stuck_band", signal=COMMAND, neutral=CENTRE_V, span=RANGE_V),
+    )
+
+
+def _sensors() -> Iterator[Effect]:
+    """What may be wrong with the three sensors, each cause at each of them."""
+    starts = (START_M, REST_PA, REST_PA)
+    for signal, unit, start in zip(OUTPUTS, (0.1, 1e5, 1e5), starts, strict=True):
+        place = public_name(signal)
+        yield SensorLag(name=f"sensor_lag@{place}", signal=signal, unit=unit, initial=start)
+        yield SensorScale(name=f"sensor_scale@{place}", signal=signal)
+        offset = PositionSensorOffset if signal == OUTPUTS[0] else PressureSensorOffset
+        yield offset(name=f"sensor_offset@{place}", signal=signal)
+
+
 def servo_drive() -> Plant:
     """The drive as identified in the paper; what it may lack stands at null."""
     chamber = dict(
@@ -96,24 +138,15 @@ def servo_drive() -> Plant:
             Chamber(name=b, side=-1, dead_volume_m3=5.525e-5, **chamber),
         ),
         effects=(
-            CommandDelay(name="command_delay", signal=COMMAND),
-            ValveLag(name="valve_lag", signal=COMMAND, initial_v=CENTRE_V),
-            ValveOffset(name="valve_offset", signal=COMMAND),
-            DeadZone(
-                name="valve_dead_zone",
-                signal=COMMAND,
-                centre_v=CENTRE_V,
-                neutral_v=CENTRE_V,
-                half_width_v=HALF_WIDTH_V,
-            ),
+            *_command_path(),
             FivePortValve(
                 name="valve",
                 first=a,
                 second=b,
                 gas_constant_j_kg_k=GAS_CONSTANT_J_KG_K,
-                flow_area_m2=2.8274e-5,
+                flow_area_m2=FLOW_AREA_M2,
                 centre_v=CENTRE_V,
-                leak_area_m2=8e-8,
+                leak_area_m2=LEAK_AREA_M2,
             ),
             WallHeat(name="wall_heat", chambers=(a, b), coefficient_w_m2_k=22.563),
             _friction(),
@@ -125,11 +158,9 @@ def servo_drive() -> Plant:
             ConstantForce(name="constant_force", body="slide"),
             SpringForce(name="spring_force", body="slide", rest_m=STROKE_M / 2),
             EndCushion(name="end_cushion", body="slide", stroke_m=STROKE_M),
-            PositionSensorOffset(name="sensor_offset@slide.position", signal=OUTPUTS[0]),
-            PressureSensorOffset(name="sensor_offset@chamber_a.pressure", signal=OUTPUTS[1]),
-            PressureSensorOffset(name="sensor_offset@chamber_b.pressure", signal=OUTPUTS[2]),
+            *_sensors(),
         ),
-        commands=(Signal(COMMAND, nominal=CENTRE_V, lower=0.0, upper=10.0),),
+        commands=(Signal(COMMAND, nominal=CENTRE_V, lower=0.0, upper=RANGE_V),),
         optional_inputs=(Signal("supply.pressure_pa", nominal=SUPPLY_PA),),
         measured=OUTPUTS,
         optional_outputs=("slide.velocity_m_s",),

@@ -4,9 +4,9 @@ A new data set is one file here and one name below; its ``everything(folder)`` g
 with the rig it was made on.
 """
 
-from workbench.recordings import printed_cylinder, vertical_cylinder
+from workbench.recordings import chamber_decay, printed_cylinder, vertical_cylinder
 from workbench.recordings.folder import real_data_folder
 
-RECORDINGS = (printed_cylinder, vertical_cylinder)
+RECORDINGS = (chamber_decay, printed_cylinder, vertical_cylinder)
 
 __all__ = ["RECORDINGS", "real_data_folder"]

@@ -1,0 +1,226 @@
+"""A 3/2 proportional spool valve on one chamber: how it opens, and two models of what follows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import casadi as ca
+
+from workbench.air import IsoLaw, NozzleLaw, Path, path_between
+from workbench.effect import (
+    Balance,
+    Cause,
+    Conditions,
+    Effect,
+    Expression,
+    Kind,
+    MassFlow,
+    form,
+    strength,
+)
+from workbench.spool import OpeningLaw, SmoothOpening, area_share, shut_while_stuck
+from workbench.vessel import PressureRate
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpoolOpening(Effect):
+    """Openings of the fill and of the vent path by a command c from 0 to 1.
+
+    s_fill = s((c - c_0) - w, 1 - c_f),   s_vent = s(-(c - c_0) - w, c_v)
+    c_f = n + w,  c_v = n - w,  n the neutral command,  c_0 = n + offset
+    A / A_max = 1 - (1 - s)^(1 + e), times 1 minus the restriction of that path
+
+    s is the opening law, w the overlap on either side.  With a stuck spool the vent stays shut
+    while c > c_v - band.
+
+    Source: paper 004 (smax, Fig. 5), errata E004-3 and E004-6; c_f = 0.52, c_v = 0.48 and the
+    corner of 0.01 are chosen in physics.md 2.6.
+    """
+
+    causes = (
+        Cause(
+            name="valve_offset",
+            strength="offset_share",
+            balance=Balance.VALVE,
+            drivers=("command",),
+            shown_by="constant commands near the centre",
+            source="papers 000, 002; physics.md section 6 (offset)",
+        ),
+        Cause(
+            name="valve_dead_zone",
+            strength="overlap_share",
+            balance=Balance.VALVE,
+            drivers=("command near centre",),
+            shown_by="slow command ramp through the centre",
+            source="paper 004 Fig. 5; physics.md 2.6",
+        ),
+        Cause(
+            name="valve_stuck_band",
+            strength="stuck_band_share",
+            balance=Balance.VALVE,
+            drivers=("command just below centre",),
+            kinked=True,
+            shown_by="small negative commands from a high pressure",
+            source="paper 004, Fig. 8 near 250 s; physics.md sections 6 and 7",
+        ),
+        Cause(
+            name="area_shape",
+            strength="area_exponent_change",
+            balance=Balance.FLOW,
+            drivers=("command at mid opening",),
+            shown_by="steps to several openings",
+            source="papers 000, 002; physics.md section 6 (area_shape)",
+        ),
+        Cause(
+            name="discharge_asymmetry",
+            strength="discharge_asymmetry",
+            balance=Balance.FLOW,
+            drivers=("direction of flow",),
+            shown_by="filling and venting between the same pressures",
+            source="papers 000, 004; physics.md section 6 (cd_asymmetry)",
+        ),
+    )
+
+    chamber: str
+    opening: OpeningLaw = SmoothOpening()
+    neutral: float = 0.5
+
+    offset_share: Expression = strength(typical=0.02, lower=-0.2, upper=0.2, deviation=2e-3)
+    overlap_share: Expression = strength(typical=0.03, upper=0.2, deviation=2e-3)
+    stuck_band_share: Expression = strength(typical=0.03, upper=0.3)
+    area_exponent_change: Expression = strength(typical=0.6, lower=-0.5, upper=2.0)
+    discharge_asymmetry: Expression = strength(typical=0.15, lower=-0.5, upper=0.5)
+    corner_share: Expression = form(0.01, lower=1e-4, upper=0.1)
+
+    @property
+    def absent(self) -> bool:
+        """Never: with all its flaws at null it is still the valve."""
+        return False
+
+    def shares(self, now: Conditions) -> tuple[Expression, Expression]:
+        """Open shares of the full area, of the fill path and of the vent path."""
+        travel = now[self.name].pwm - self.neutral - self.offset_share
+        fill = self._share(travel, 1.0 - self.neutral)
+        vent = self._share(-travel, self.neutral)
+        stuck = shut_while_stuck(-travel - self.overlap_share, self.stuck_band_share)
+        return fill, vent * (1.0 - stuck)
+
+    def _share(self, travel: Expression, span: Expression) -> Expression:
+        free, left = travel - self.overlap_share, span - self.overlap_share
+        opening = self.opening(free, left, self.corner_share)
+        return area_share(opening, 1.0 + self.area_exponent_change)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ThreePortValve(SpoolOpening):
+    """First principles: nozzles from the supply to the chamber and from there to the atmosphere.
+
+    mdot = a_f phi(p_src, p) - a_v phi(p, p_atm),   phi by the nozzle law, direction by pressures
+    a    = C (1 +- e) A_max A/A_max,   + where gas enters the chamber, - where it leaves
+
+    alpha and beta of the paper are C times C_sub and C_chk with Z R/M as gas constant.  Its theta
+    compares p_u/p_d, the inverse of the other papers' ratio (erratum E004-5).  The slope at equal
+    pressures is infinite as printed; the straight line of physics.md 1.1 c repairs it (E004-2).
+
+    Source: paper 004 Eqs. 1 to 4; C may differ for filling and venting there.
+    """
+
+    causes = (
+        *SpoolOpening.causes,
+        Cause(
+            name="exhaust_restriction",
+            strength="exhaust_restriction_share",
+            balance=Balance.FLOW,
+            drivers=("command below centre",),
+            shown_by="venting from full pressure at several openings",
+            source="papers 002, 003; physics.md section 6",
+        ),
+        Cause(
+            name="supply_restriction",
+            strength="supply_restriction_share",
+            balance=Balance.FLOW,
+            drivers=("command above centre",),
+            shown_by="filling from ambient at several openings",
+            source="interface.md section 6 (supply areas x (1 - share))",
+        ),
+        Cause(
+            name="spool_leak",
+            strength="leak_area_m2",
+            balance=Balance.MASS,
+            drivers=("pressure while the valve is closed",),
+            shown_by="valve closed for 20 s from two different pressures",
+            source="papers 002, 004 (observed); physics.md 1.1 d",
+        ),
+        Cause(
+            name="flow_shape",
+            strength="iso_share",
+            forms=("critical_ratio",),
+            shapes={"critical_ratio": (0.2, 0.35)},
+            balance=Balance.FLOW,
+            drivers=("pressure ratio",),
+            kind=Kind.PARAMETER,
+            shown_by="the subsonic ends of filling and venting curves",
+            source="paper 002 Eq. 3; physics.md section 6 (flow_b)",
+        ),
+    )
+
+    flow_area_m2: Expression = form(25e-6, lower=1e-9, upper=1e-3, relative_deviation=0.05)
+    discharge_coefficient: Expression = form(0.72, lower=0.1, upper=1.0)
+    exhaust_restriction_share: Expression = strength(typical=0.4, upper=0.9)
+    supply_restriction_share: Expression = strength(typical=0.4, upper=0.9)
+    leak_area_m2: Expression = strength(typical=1e-7, upper=5e-6)
+    iso_share: Expression = strength(typical=1.0, upper=1.0)
+    critical_ratio: Expression = form(0.3, lower=0.05, upper=0.6)
+
+    def terms(self, now: Conditions) -> Iterator[MassFlow]:
+        gas, outside = now[self.chamber], now["atmosphere"]
+        fill, vent = self.shares(now)
+        charge = path_between(now["supply"], gas, gas.gas_constant_j_kg_k)
+        outlet = path_between(gas, outside)
+        into_kg_s = gas.line_share * self._flow(
+            charge, fill * (1.0 - self.supply_restriction_share), +1
+        )
+        out_kg_s = gas.line_share * self._flow(
+            outlet, vent * (1.0 - self.exhaust_restriction_share), -1
+        )
+        yield MassFlow(self.chamber, into_kg_s, charge.temperature_k)
+        yield MassFlow("supply", -into_kg_s, charge.temperature_k)
+        yield MassFlow(self.chamber, -out_kg_s, outlet.temperature_k)
+
+    def _flow(self, path: Path, share: Expression, side: int) -> Expression:
+        """Flow along a path; ``side`` is +1 where its forward direction enters the chamber."""
+        entering = side * (2.0 * path.forward - 1.0)
+        nozzle = NozzleLaw()(path.ratio)
+        iso = IsoLaw(self.critical_ratio)(path.ratio)
+        law = nozzle + self.iso_share * (iso - nozzle)
+        effective = self.discharge_coefficient * (1.0 + self.discharge_asymmetry * entering)
+        holes_m2 = effective * self.flow_area_m2 * share * law + self.leak_area_m2 * nozzle
+        return holes_m2 * path.choked_kg_s_m2
+
+
+@dataclass(frozen=True, kw_only=True)
+class ParametricValve(SpoolOpening):
+    """One time constant instead of flows: tau dp/dt = a f.
+
+    f = p_src - p where a >= 0,   p - p_atm where a < 0;   a = s_fill - s_vent from -1 to 1
+
+    With the smooth opening law a is the area map (a_f - a_v)/A_max; with :class:`SharpOpening` and
+    no overlap it is the linear map 2 c - 1.  K A = 1.  a counts times 1 + e for filling and 1 - e
+    for venting.
+
+    Source: paper 004 Eqs. 5 and 6; tau 0.05 s (area map) and 0.075 s (linear map) are fitted to
+    the first-principles model in physics.md 2.6.
+    """
+
+    time_constant_s: Expression = form(0.05, lower=1e-3, upper=5.0, relative_deviation=0.05)
+
+    def terms(self, now: Conditions) -> Iterator[PressureRate]:
+        own_pa = now[self.chamber].pressure_pa
+        fill, vent = self.shares(now)
+        net = fill - vent
+        filling = (1.0 + self.discharge_asymmetry) * ca.fmax(net, 0.0)
+        venting = (1.0 - self.discharge_asymmetry) * ca.fmin(net, 0.0)
+        driven_pa = filling * (now["supply"].pressure_pa - own_pa)
+        driven_pa += venting * (own_pa - now["atmosphere"].pressure_pa)
+        yield PressureRate(self.chamber, driven_pa / self.time_constant_s)
