@@ -90,6 +90,7 @@ def stepped(arm, gains):
     return speed[:, -500:].std(axis=1), np.degrees(record[ANGLE])
 
 
+@pytest.mark.slow
 def test_the_arm_rests_with_stribeck_friction_and_oscillates_with_viscous_alone(arm):
     """Physics.md 7, PID (4, 4, 0.4): 3..18 deg/s against 207..304 deg/s, 5.6 deg between them.
 
@@ -104,6 +105,7 @@ def test_the_arm_rests_with_stribeck_friction_and_oscillates_with_viscous_alone(
     assert 2.0 < np.sqrt(np.mean((full_deg - viscous_deg) ** 2)) < 6.0
 
 
+@pytest.mark.slow
 def test_with_a_quarter_of_the_gains_only_viscous_friction_oscillates(arm):
     """Physics.md 7, PID (1.5, 1, 0.1): below 5 deg/s full and linear, 20..81 deg/s viscous.
 
@@ -131,6 +133,7 @@ def test_the_arm_tracks_a_slow_sine_and_not_a_fast_one(arm, rad_s, expected_deg)
     assert np.sqrt(np.mean(error**2)) == pytest.approx(expected_deg, abs=0.06)
 
 
+@pytest.mark.slow
 def test_a_redraw_that_only_stops_commands_and_measurements_is_harmless(arm):
     """Physics.md 7: 2.18 -> 2.26 deg where only the measurement of one machine freezes."""
     time_s = DT * np.arange(6000)
@@ -176,6 +179,7 @@ def network(redraw_hz=0.0):
     return delay, PacketPause(name="pause", signals=EXCHANGED, redraw_hz=redraw_hz)
 
 
+@pytest.mark.slow
 def test_a_redraw_at_10_hz_destroys_the_cosimulation_and_one_at_1_hz_does_not():
     """Physics.md 7, PID (3, 2, 0.2): 34, 34, 36 and 480 deg/s (RMSE 13 deg).
 
