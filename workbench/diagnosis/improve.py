@@ -158,9 +158,8 @@ def accept(rig: Rig, diagnosis: Diagnosis) -> Addition:
     if best is None or best.fit is None:
         raise ValueError(f"{diagnosis.rig_name}: the diagnosis followed no candidate to a refit")
     problem = pose_again(rig, diagnosis)
-    held_out = problem.validated(best.fit)
     drops = (best.drop_train, best.drop_validation)
-    return _addition(rig, problem, best.candidate, best.fit, held_out, drops)
+    return _addition(rig, problem, best.candidate, best.fit, best.validation, drops)
 
 
 def pose_again(rig: Rig, diagnosis: Diagnosis) -> Problem:

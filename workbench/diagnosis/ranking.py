@@ -89,6 +89,7 @@ def _refitted(
         accepted=not against,
         reasons=against,
         fit=each.fit,
+        validation=each.validation,
     )
 
 

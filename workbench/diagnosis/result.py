@@ -57,6 +57,8 @@ class Ranked:
         Share of its effect on this recording that the fitted parameters can imitate.
     accepted, reasons
         Whether it passes every criterion of diagnosis.md 1.6, and why not in words.
+    fit, validation
+        The refit and the same plant on the held-out recordings; None where it was not followed.
     """
 
     candidate: Candidate
@@ -70,6 +72,7 @@ class Ranked:
     accepted: bool
     reasons: tuple[str, ...]
     fit: Fit | None = field(default=None, repr=False)
+    validation: Fit | None = field(default=None, repr=False)
 
 
 @dataclass(frozen=True)

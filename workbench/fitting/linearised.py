@@ -71,16 +71,15 @@ def linearise(windows: Windows, unknowns: Unknowns, point: Point) -> Linearised:
     plants = [plant_at(windows, unknowns, point.t)] * (1 + n_x)
     starts = [point.starts] * (1 + n_x + n_p)
     for k in range(n_x):
-        moved = point.starts.copy()
-        moved[k] += h_x[k]
-        starts[1 + k] = moved
+        stepped = point.starts.copy()
+        stepped[k] += h_x[k]
+        starts[1 + k] = stepped
     h_p = parameter_steps(unknowns, point.t)
     plants += [plant_at(windows, unknowns, point.t + h_p[k] * unit(n_p, k)) for k in range(n_p)]
     r = windows.residuals(plants, np.array(starts)).transpose(0, 2, 1, 3)
     n = len(windows)
     r = r.reshape(len(plants), n, -1)
-    away = ((point.starts - windows.start) / windows.start_deviation).T
-    residual = np.concatenate([r[0], away], axis=1)
+    residual = _with_priors(windows, point, r[0])
     J_x = np.concatenate(
         [
             (r[1 : 1 + n_x] - r[0]).transpose(1, 2, 0) / START_STEP,
@@ -102,9 +101,14 @@ def moved(windows: Windows, unknowns: Unknowns, at: Linearised, point: Point) ->
     ``at`` may belong to other values of the same unknowns, or to a plant with other values.
     """
     r = windows.residuals([plant_at(windows, unknowns, point.t)], point.starts)[0]
-    away = ((point.starts - windows.start) / windows.start_deviation).T
     rows = r.transpose(1, 0, 2).reshape(len(windows), -1)
-    return replace(at, point=point, residual=np.concatenate([rows, away], axis=1))
+    return replace(at, point=point, residual=_with_priors(windows, point, rows))
+
+
+def _with_priors(windows: Windows, point: Point, rows: np.ndarray) -> np.ndarray:
+    """Residuals (n_windows, rows) with the prior rows of the start states behind them."""
+    away = ((point.starts - windows.start) / windows.start_deviation).T
+    return np.concatenate([rows, away], axis=1)
 
 
 def rescaled(at: Linearised, before: Windows, after: Windows) -> Linearised:
@@ -137,8 +141,7 @@ def borrowed(
             J[:, :, k] = near.parameters[:, :, known.names.index(name)]
     for row, k in enumerate(new):
         J[:, : r.shape[2], k] = (r[row] - r[-1]) / h[k]
-    away = ((point.starts - windows.start) / windows.start_deviation).T
-    residual = np.concatenate([r[-1], away], axis=1)
+    residual = _with_priors(windows, point, r[-1])
     return replace(near, point=point, residual=residual, parameters=J)
 
 
