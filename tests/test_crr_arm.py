@@ -5,6 +5,7 @@ import oracle_crr_arm as oracle
 import oracle_crr_rig as rig
 import pytest
 from conftest import PLANT_MODELS
+from flat_cylinder import assert_same_as_flat
 from network_loop import Pid, tracked
 
 from workbench.cosimulation import cosimulate
@@ -49,14 +50,7 @@ def random_states():
 def test_the_composed_arm_has_the_rates_and_outputs_of_the_flat_one(arm):
     size = np.array([1.0, 100.0, 1e5, 1e-3, 1e5, 1e-3])
     for x, u in random_states():
-        known = dict(zip(ORACLE_STATES, x, strict=True))
-        state = [known.get(name, 0.0) for name in arm.model.states]
-        rates, outputs = arm.model.f(state, [u], [], arm.nominal[2])
-        rate = dict(zip(arm.model.states, rates.full().ravel(), strict=True))
-        ours = np.array([rate[name] for name in ORACLE_STATES])
-
-        np.testing.assert_allclose(ours / size, oracle.rates(x, u) / size, 1e-10, 1e-10)
-        np.testing.assert_array_equal(outputs.full().ravel(), x[[0, 2, 4]])
+        assert_same_as_flat(arm, ORACLE_STATES, x, u, oracle.rates(x, u), size)
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ import numpy as np
 import oracle_crr_rig as oracle
 import pytest
 from conftest import PLANT_MODELS, standing_at
+from flat_cylinder import assert_same_as_flat
 from network_loop import tracked
 
 from workbench.effects.proportional_valve import TwoFlows, segment_area_m2
@@ -64,14 +65,7 @@ def random_states():
 def test_the_composed_rig_has_the_rates_and_outputs_of_the_flat_one(rig):
     size = np.array([1.0, 10.0, 1e5, 1e-3, 1e5, 1e-3])
     for x, u in random_states():
-        known = dict(zip(ORACLE_STATES, x, strict=True))
-        state = [known.get(name, 0.0) for name in rig.model.states]
-        rates, outputs = rig.model.f(state, [u], [], rig.nominal[2])
-        rate = dict(zip(rig.model.states, rates.full().ravel(), strict=True))
-        ours = np.array([rate[name] for name in ORACLE_STATES])
-
-        np.testing.assert_allclose(ours / size, oracle.rates(x, u) / size, 1e-10, 1e-10)
-        np.testing.assert_array_equal(outputs.full().ravel(), x[[0, 2, 4]])
+        assert_same_as_flat(rig, ORACLE_STATES, x, u, oracle.rates(x, u), size)
 
 
 def test_a_lean_rig_has_no_bristle_and_the_same_friction():
