@@ -1,7 +1,8 @@
 """One round of diagnosis: which physical effect is missing.
 
-Prior fit, projected profile scan over the catalogue, refits of the best few, judgement on a
-held-out recording, ties, and the verdict in words.  Nothing is changed and nothing is written.
+Prior fit, projected profile scan over the catalogue, first fits of the ten that it puts in front,
+refits of the best few, judgement on a held-out recording, ties, and the verdict in words.  Nothing
+is changed and nothing is written.
 
 Source: diagnosis.md 1.2 to 1.9.
 """
@@ -22,6 +23,7 @@ from workbench.diagnosis.law import empirical_law
 from workbench.diagnosis.ranking import predicts_row, ranked
 from workbench.diagnosis.refit import Refit, refit, refit_shift
 from workbench.diagnosis.result import Diagnosis, Law, Ranked, Verdict
+from workbench.diagnosis.rough import rough_fit
 from workbench.diagnosis.scan import Profile, scan
 from workbench.diagnosis.shifts import Shift, shifts
 from workbench.diagnosis.where import locate
@@ -32,10 +34,12 @@ from workbench.fitting.windows import MOST_WINDOWS
 from workbench.recording import Recording
 from workbench.rig import Rig
 
-REFITTED = 5  # candidates that are followed beyond the scan at the most
-ALWAYS_REFITTED = 2
+FITTED_FIRST = 8  # candidates that are followed beyond the scan at the most
+WORTH_A_LOOK = 0.05  # of the best drop of the scan
+REFITTED = 5  # of those, at the most
+WORTH_A_REFIT = 0.4  # of the best share of the first fits
 SHIFTS_REFITTED = 2  # parameters that leave their priors
-WORTH_A_REFIT = 0.25  # of the best drop of the scan, for shifts of the best refit
+WORTH_A_SHIFT = 0.25  # of the best refit
 CERTAIN_SHARE = 0.5  # an accepted candidate above it needs no comparison with an empirical law
 
 WEAK_EVIDENCE = "no validation recording: the last third is held out, which is weak evidence"
@@ -116,21 +120,29 @@ def _followed(problem: Problem, progress: Progress) -> _Followed:
     """Scan the catalogue and refit the best few."""
     progress("scan of the catalogue")
     profiles = _scanned(problem)
+    looked = [p for p in profiles[:FITTED_FIRST] if p.drop > WORTH_A_LOOK * profiles[0].drop]
+    progress(f"first fits of {len(looked)} candidates")
+    begun = sorted((rough_fit(problem, p) for p in looked), key=lambda each: -each.share)
     refits: list[Refit] = []
-    for rank, profile in enumerate(profiles[:REFITTED]):
-        accepted = any(not reasons_against(problem.base, each) for each in refits)
-        promising = profile.drop > WORTH_A_REFIT * profiles[0].drop
-        hopeful = not accepted and profile.drop > LEAST_TRAINING * problem.misfit
-        if rank < ALWAYS_REFITTED or promising or hopeful:
-            progress(f"refit with {profile.candidate.name}")
-            refits.append(refit(problem, profile))
+    for each in begun[:REFITTED]:
+        accepted = any(not reasons_against(problem.base, found) for found in refits)
+        promising = each.share > WORTH_A_REFIT * begun[0].share
+        hopeful = not accepted and each.share > LEAST_TRAINING
+        if promising or hopeful or not refits:
+            progress(f"refit with {each.profile.candidate.name}")
+            refits.append(refit(problem, each))
     moved = shifts(problem)
-    least = WORTH_A_REFIT * max((each.drop_train for each in refits), default=0.0)
+    least = WORTH_A_SHIFT * max((each.drop_train for each in refits), default=0.0)
     for shift in [each for each in moved if each.leaves and each.drop > least][:SHIFTS_REFITTED]:
         progress(f"refit with {shift.name} free")
-        refits.append(refit_shift(problem, shift))
+        refits.append(refit_shift(problem, shift, _best_share(refits)))
     refits.sort(key=lambda each: (not predicts(each), -each.drop_train))
     return _Followed(profiles, refits, moved)
+
+
+def _best_share(refits: list[Refit]) -> float:
+    """Share of the misfit that the best refit so far removes, held out too."""
+    return max((each.drop_train for each in refits if predicts(each)), default=0.0)
 
 
 def _scanned(problem: Problem) -> list[Profile]:
@@ -152,7 +164,8 @@ def _scanned(problem: Problem) -> list[Profile]:
 def _law(problem: Problem, ranking: tuple[Ranked, ...], progress: Progress) -> Law | None:
     """An empirical law, unless an effect of the catalogue explains most of the misfit already.
 
-    A parameter that leaves its prior is no such effect: it may well imitate the law.
+    A parameter that leaves its prior is no such effect: it may well imitate the law.  So the law
+    is to leave a fifth less than the best effect, and only less than the best shift.
     """
     leader = ranking[0] if ranking else None
     certain = leader and leader.accepted and leader.kind is Kind.EFFECT
@@ -160,9 +173,13 @@ def _law(problem: Problem, ranking: tuple[Ranked, ...], progress: Progress) -> L
         return None
     progress("empirical law")
     law = empirical_law(problem)
-    followed = [r.drop_train for r in ranking if r.fit is not None and predicts_row(r)]
-    left = 1.0 - max(followed, default=0.0)
-    return law if law and 1.0 - law.drop_train < (1.0 - CLEARLY_LESS) * left else None
+    followed = [r for r in ranking if r.fit is not None and predicts_row(r)]
+    effect, shift = (
+        max((r.drop_train for r in followed if r.kind is kind), default=0.0)
+        for kind in (Kind.EFFECT, Kind.PARAMETER)
+    )
+    left = min((1.0 - CLEARLY_LESS) * (1.0 - effect), 1.0 - shift)
+    return law if law and 1.0 - law.drop_train < left else None
 
 
 def _verdict(ranking: tuple[Ranked, ...], law: Law | None, held_out: bool) -> Verdict:

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 from workbench.diagnosis.diagnose import WEAK_EVIDENCE, Progress, diagnose, silent
 from workbench.diagnosis.refit import refit
 from workbench.diagnosis.result import Diagnosis
+from workbench.diagnosis.rough import rough_fit
 from workbench.diagnosis.scan import scan
 from workbench.fitting.errors import Errors, errors_of, per_sample
 from workbench.fitting.gauss_newton import Fit
@@ -97,7 +98,7 @@ def add(
     progress(f"refit with {name}")
     base = problem.base
     profiles = scan(problem.whole, base.windows, base.unknowns, base.point, [candidate])
-    found = refit(problem, profiles[0])
+    found = refit(problem, rough_fit(problem, profiles[0]))
     drops = (found.drop_train, found.drop_validation)
     return _addition(rig, problem, candidate, found.fit, found.validation, drops)
 

@@ -99,13 +99,13 @@ def _size_reasons(refit: Refit) -> list[str]:
     return reasons
 
 
-def tie_group(refits: list[Refit], profiles: dict[str, Profile]) -> list[Refit]:
+def tie_group(base: Fit, refits: list[Refit], profiles: dict[str, Profile]) -> list[Refit]:
     """The leader and those that cannot be told from it, the leader first, at most three.
 
     A candidate is tied when its drop comes within a quarter of the best, or within half of it with
     a signature in the same direction: then only the nuisances decide between the two.  Among the
-    tied the held-out recording decides where it does so clearly: the one that leaves at least a
-    fifth less of the misfit there leads.
+    tied those that pass every criterion come first, and among these the held-out recording decides
+    where it does so clearly: the one that leaves at least a fifth less of the misfit there leads.
     """
     best = refits[0]
     tied = [best]
@@ -117,7 +117,8 @@ def tie_group(refits: list[Refit], profiles: dict[str, Profile]) -> list[Refit]:
         if gap < CLOSE_DROP or (cosine > SAME_DIRECTION and gap < CLOSE_DROP_SAME):
             tied.append(other)
     tied = tied[:LARGEST_TIE]
-    leader = min(tied, key=_left_held_out)
+    sound = [each for each in tied if not reasons_against(base, each)] or tied
+    best, leader = sound[0], min(sound, key=_left_held_out)
     if not _left_held_out(leader) < (1.0 - CLEARLY_LESS) * _left_held_out(best):
         leader = best
     return [leader, *(each for each in tied if each is not leader)]

@@ -17,6 +17,7 @@ import numpy as np
 from workbench.diagnosis.judge import reasons_against
 from workbench.diagnosis.refit import Refit, refit
 from workbench.diagnosis.result import Law
+from workbench.diagnosis.rough import rough_fit
 from workbench.diagnosis.scan import scan
 from workbench.effects.empirical import EmpiricalFlow, EmpiricalForce
 from workbench.fitting.problem import Problem, misfit
@@ -90,7 +91,11 @@ def _next_term(problem: Problem, accepted: list[Candidate]) -> Refit | None:
         if c.cause.name.startswith("law[") and c not in accepted
     ]
     profiles = scan(problem.whole, at.windows, at.unknowns, at.point, left, at.derivatives)
-    return refit(problem, profiles[0]) if profiles and profiles[0].drop > 0 else None
+    return (
+        refit(problem, rough_fit(problem, profiles[0]))
+        if profiles and profiles[0].drop > 0
+        else None
+    )
 
 
 def _counted_from(first: Problem, found: Refit) -> Refit:

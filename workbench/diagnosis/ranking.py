@@ -21,7 +21,7 @@ def ranked(
     recording refuses, then the rest by the scan.
     """
     by_name = {profile.candidate.name: profile for profile in profiles}
-    group = tie_group(refits, by_name) if refits else []
+    group = tie_group(problem.base, refits, by_name) if refits else []
     names = [each.candidate.name for each in group]
     tied = {name: tuple(n for n in names if n != name) for name in names}
     rows = {r.candidate.name: _refitted(problem, r, by_name, tied) for r in refits}

@@ -21,7 +21,7 @@ Source: diagnosis.md 1.4.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -33,6 +33,7 @@ from workbench.fitting.unknowns import Unknowns
 from workbench.fitting.windows import Windows
 from workbench.plant import Candidate, Plant
 
+MOST_WINDOWS = 24  # that a scan looks at
 LARGEST_STEP = 6.0  # prior deviations a nuisance may move in one linear step
 
 
@@ -143,8 +144,13 @@ def scan(
 
     ``whole`` is the windows' plant with all absent effects in their places.  Candidates with
     states of their own are run on a plant that has them; the others share one.  ``at`` are the
-    derivatives at the point where they are known already.
+    derivatives at the point where they are known already.  Where there are many windows, every
+    so many-th is enough to tell candidates apart; drops count as of all.
     """
+    total = len(windows)
+    windows, kept = windows.part(MOST_WINDOWS)
+    of_all = total / len(windows)
+    point, at = replace(point, starts=point.starts[:, kept]), at.part(kept) if at else None
     metric = metric_at(windows, unknowns, point, at)
     values = unknowns.values(point.t)
     groups: dict[tuple[str, ...], list[Candidate]] = {}
@@ -161,7 +167,7 @@ def scan(
         ]
         plants = [richer.plant.with_values({**values, **change}) for _, change in trials]
         rows = metric.rows(richer.residuals(plants, starts))
-        profiles += _profiles(metric, trials, rows)
+        profiles += _profiles(metric, trials, rows, of_all)
     return sorted(profiles, key=lambda profile: -profile.drop)
 
 
@@ -184,13 +190,16 @@ def sizes_to_try(plant: Plant, candidate: Candidate) -> list[dict[str, float]]:
 
 
 def _profiles(
-    metric: Metric, trials: list[tuple[Candidate, dict[str, float]]], rows: np.ndarray
+    metric: Metric,
+    trials: list[tuple[Candidate, dict[str, float]]],
+    rows: np.ndarray,
+    of_all: float,
 ) -> list[Profile]:
     found: dict[str, list[tuple[Trial, np.ndarray]]] = {}
     before = metric.cost
     for (candidate, change), row in zip(trials, rows, strict=True):
         cost, step = metric.explained(row)
-        trial = Trial(candidate, change, before - cost, step)
+        trial = Trial(candidate, change, of_all * (before - cost), step)
         found.setdefault(candidate.name, []).append((trial, row))
     profiles = []
     for pairs in found.values():

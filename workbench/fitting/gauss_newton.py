@@ -18,9 +18,10 @@ from workbench.fitting.linearised import (
     Linearised,
     Point,
     linearise,
-    moved,
     normal_equations,
     plant_at,
+    secant,
+    seen_at,
 )
 from workbench.fitting.unknowns import Unknowns
 from workbench.fitting.windows import Windows
@@ -30,8 +31,9 @@ LONGEST_STEP = 4.0  # of a scaled unknown in one step: beyond, the plant may be 
 LONGEST_FREE_STEP = 40.0  # of one without a prior, which is counted in tenths of its typical size
 LONGEST_START_STEP = 8.0  # of a start state, in its deviations
 DAMPINGS = (0.0, 0.3, 3.0, 30.0)
+HALF = 0.5  # of the fall that the quadratic model promises: then a step needs no rivals
 AGAIN = 0.02  # relative fall of the cost above which derivatives are used once more
-CONVERGED = 5e-3  # relative fall of the cost below which a fit has converged
+CONVERGED = 0.01  # relative fall of the cost below which a fit has converged
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,7 @@ class Fit:
     cost
         The same with the priors of parameters and start states.
     converged
-        False where the last step still brought more than 0.5 %.
+        False where the last step still brought more than 1 %.
     derivatives
         Those that the last step used, with the residual of where the fit ended.
     """
@@ -82,62 +84,69 @@ def fit_windows(
 ) -> Fit:
     """Fit the unknowns and the start states; see the module's docstring.
 
-    Every step is taken only if the cost falls; a batch of damped steps is tried at once.  As long
-    as steps bring more than 2 %, the next uses the same derivatives again: they are the dear part.
-    ``at`` are derivatives to begin with, taken near by.
+    Every step is taken only if the cost falls.  As long as steps bring more than 2 %, the next
+    uses the same derivatives, corrected by what the step showed: they are the dear part.
+    ``at`` are derivatives to begin with, taken near by, with the residual of the start.
     """
     point = start or Point(unknowns.scaled(windows.plant.values), windows.start)
     now = points_costs(windows, unknowns, [point]).best
     fresh, converged, stale = False, False, at is None
     for _ in range(iterations):
         if stale or at is None:
-            at, fresh = linearise(windows, unknowns, point), True
-        found = _stepped(windows, unknowns, at, point, now)
+            at, fresh = linearise(windows, unknowns, now.point), True
+        found = _stepped(windows, unknowns, at, now)
         fall = (now.cost - found.cost) / max(now.cost, 1e-12)
-        if fall > 0:
-            now = found
-            point = found.point
+        now = min(now, found, key=lambda each: each.cost)
         converged = fall < CONVERGED
         if converged and fresh:
             break
         stale, fresh = fall < AGAIN, False
         if not stale:
-            at = moved(windows, unknowns, at, point)
-    at = moved(windows, unknowns, at, point) if at else linearise(windows, unknowns, point)
-    return Fit(windows, unknowns, point, now.chi2, now.cost, converged, at)
+            at = secant(windows, at, now.point, now.residual)
+    at = at or linearise(windows, unknowns, now.point)
+    at = seen_at(windows, at, now.point, now.residual)
+    return Fit(windows, unknowns, now.point, now.chi2, now.cost, converged, at)
 
 
-def _stepped(windows: Windows, unknowns: Unknowns, at: Linearised, point: Point, now: Cost) -> Cost:
-    """The best of a batch of damped steps.
+def _stepped(windows: Windows, unknowns: Unknowns, at: Linearised, now: Cost) -> Cost:
+    """The full step where it keeps half of what it promises, else the best of several damped ones.
 
     Where none brings much, the windows that got worse under the full step are left out of the
     quadratic model, and its steps are tried again: a window that runs across a break-away has
     slopes that hold nowhere, and would hold all others back.
     """
-    batch = points_costs(windows, unknowns, _trials(windows, unknowns, at, point))
-    best = batch.best
+    steps = _damped_steps(at, unknowns)
+    full, *others = (_after(windows, unknowns, now.point, step) for step in steps)
+    first = points_costs(windows, unknowns, [full]).best
+    promised = now.cost - _promised(at, unknowns, steps[0])
+    if now.cost - first.cost > HALF * promised > 0:
+        return first
+    best = min((first, points_costs(windows, unknowns, others).best), key=lambda each: each.cost)
     if now.cost - best.cost > AGAIN * now.cost:
         return best
-    worse = batch.full.by_window > now.by_window
+    worse = first.by_window > now.by_window
     if not worse.any() or worse.all():
         return best
-    others = _trials(windows, unknowns, at, point, ~worse)
-    again = points_costs(windows, unknowns, others).best
+    left = [_after(windows, unknowns, now.point, s) for s in _damped_steps(at, unknowns, ~worse)]
+    again = points_costs(windows, unknowns, left).best
     return min(best, again, key=lambda each: each.cost)
 
 
-def _trials(
-    windows: Windows,
-    unknowns: Unknowns,
-    at: Linearised,
-    point: Point,
-    counted: np.ndarray | None = None,
-) -> list[Point]:
-    """Damped steps from a point, within bounds; parameters follow the counted windows."""
-    return [
-        Point(unknowns.clipped(point.t + dt), point.starts + dx * windows.start_deviation)
-        for dt, dx in _damped_steps(at, unknowns, counted)
-    ]
+Step = tuple[np.ndarray, np.ndarray]  # of the scaled unknowns, and of the scaled start states
+
+
+def _after(windows: Windows, unknowns: Unknowns, point: Point, step: Step) -> Point:
+    """A step from a point, within bounds."""
+    dt, dx = step
+    return Point(unknowns.clipped(point.t + dt), point.starts + dx * windows.start_deviation)
+
+
+def _promised(at: Linearised, unknowns: Unknowns, step: Step) -> float:
+    """The cost after a step by the quadratic model."""
+    dt, dx = step
+    moved_by = at.parameters @ dt + (at.basis @ (at.triangle @ dx.T[:, :, None]))[:, :, 0]
+    prior = np.sum(unknowns.precision * (at.point.t + dt) ** 2)
+    return float(np.sum((at.residual + moved_by) ** 2) + prior)
 
 
 def best_start(windows: Windows, unknowns: Unknowns, points: list[Point]) -> Point:
@@ -147,8 +156,11 @@ def best_start(windows: Windows, unknowns: Unknowns, points: list[Point]) -> Poi
 
 def _damped_steps(
     at: Linearised, unknowns: Unknowns, counted: np.ndarray | None = None
-) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Gauss-Newton steps of unknowns and start states, one per damping."""
+) -> list[Step]:
+    """Gauss-Newton steps of unknowns and start states, one per damping; the first is undamped.
+
+    Parameters follow the ``counted`` windows.
+    """
     normal = normal_equations(at, unknowns, counted)
     H, g = normal.hessian, normal.gradient
     longest = np.where(unknowns.precision < 1.0, LONGEST_FREE_STEP, LONGEST_STEP)
@@ -166,12 +178,17 @@ def _damped_steps(
 
 @dataclass(frozen=True)
 class Cost:
-    """What a point costs: squared residuals, and with priors; ``by_window`` has (n_windows,)."""
+    """What a point costs: squared residuals, and with priors.
+
+    by_window   share of each window, (n_windows,)
+    residual    weighted, (n_y, n_windows, L)
+    """
 
     point: Point
     chi2: float
     cost: float
     by_window: np.ndarray
+    residual: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -185,11 +202,6 @@ class Costs:
         """The cheapest."""
         return min(self.rows, key=lambda each: each.cost)
 
-    @property
-    def full(self) -> Cost:
-        """The first of the batch: of damped steps the undamped one."""
-        return self.rows[0]
-
 
 def points_costs(windows: Windows, unknowns: Unknowns, points: list[Point]) -> Costs:
     """Costs of points, all run in one batch."""
@@ -201,5 +213,5 @@ def points_costs(windows: Windows, unknowns: Unknowns, points: list[Point]) -> C
         away = (point.starts - windows.start) / windows.start_deviation
         own = squares + np.sum(away**2, axis=0)
         prior = float(np.sum(unknowns.precision * point.t**2))
-        rows.append(Cost(point, float(squares.sum()), float(own.sum()) + prior, own))
+        rows.append(Cost(point, float(squares.sum()), float(own.sum()) + prior, own, residual))
     return Costs(tuple(rows))

@@ -57,6 +57,12 @@ class Linearised:
     basis: np.ndarray
     triangle: np.ndarray
 
+    def part(self, kept: np.ndarray) -> Linearised:
+        """The same of some of the windows."""
+        point = Point(self.point.t, self.point.starts[:, kept])
+        rows = (self.residual, self.parameters, self.basis, self.triangle)
+        return Linearised(point, *(each[kept] for each in rows))
+
     def projected(self, rows: np.ndarray) -> np.ndarray:
         """What the start states cannot explain of columns (n_windows, rows, ...)."""
         flat = rows.reshape(*rows.shape[:2], int(np.prod(rows.shape[2:])))
@@ -67,13 +73,9 @@ class Linearised:
 def linearise(windows: Windows, unknowns: Unknowns, point: Point) -> Linearised:
     """Residuals and derivatives by one batch of simulations; see :class:`Linearised`."""
     n_x, n_p = windows.start.shape[0], len(unknowns)
-    h_x = START_STEP * windows.start_deviation
     plants = [plant_at(windows, unknowns, point.t)] * (1 + n_x)
-    starts = [point.starts] * (1 + n_x + n_p)
-    for k in range(n_x):
-        stepped = point.starts.copy()
-        stepped[k] += h_x[k]
-        starts[1 + k] = stepped
+    starts = [point.starts, *(_stepped_start(windows, point, k) for k in range(n_x))]
+    starts += [point.starts] * n_p
     h_p = parameter_steps(unknowns, point.t)
     plants += [plant_at(windows, unknowns, point.t + h_p[k] * unit(n_p, k)) for k in range(n_p)]
     r = windows.residuals(plants, np.array(starts)).transpose(0, 2, 1, 3)
@@ -89,20 +91,42 @@ def linearise(windows: Windows, unknowns: Unknowns, point: Point) -> Linearised:
     )
     J_p = (r[1 + n_x :] - r[0]).transpose(1, 2, 0) / h_p
     J_p = np.concatenate([J_p, np.zeros((n, n_x, n_p))], axis=1)
-    basis, triangle = (
-        np.linalg.qr(J_x) if n_x else (np.zeros((*residual.shape, 0)), np.zeros((n, 0, 0)))
-    )
-    return Linearised(point, residual, J_p, basis, triangle)
+    return Linearised(point, residual, J_p, *_factors(J_x))
 
 
 def moved(windows: Windows, unknowns: Unknowns, at: Linearised, point: Point) -> Linearised:
-    """The same derivatives with the residual of another point.
+    """The same derivatives with the residual of another point, which is simulated.
 
     ``at`` may belong to other values of the same unknowns, or to a plant with other values.
     """
     r = windows.residuals([plant_at(windows, unknowns, point.t)], point.starts)[0]
-    rows = r.transpose(1, 0, 2).reshape(len(windows), -1)
+    return seen_at(windows, at, point, r)
+
+
+def seen_at(windows: Windows, at: Linearised, point: Point, residual: np.ndarray) -> Linearised:
+    """The same derivatives with the residual (n_y, n_windows, L) of another point."""
+    rows = residual.transpose(1, 0, 2).reshape(len(windows), -1)
     return replace(at, point=point, residual=_with_priors(windows, point, rows))
+
+
+def secant(windows: Windows, at: Linearised, point: Point, residual: np.ndarray) -> Linearised:
+    """Derivatives corrected by a step: they give the change of the residual it brought.
+
+    With s the step of a window in scaled unknowns and start states, and d what its residual
+    changed beyond J s, the smallest such correction is J + d s' / s's, window by window.
+
+    Source: Broyden 1965, "A class of methods for solving nonlinear simultaneous equations".
+    """
+    after = seen_at(windows, at, point, residual)
+    dt = point.t - at.point.t
+    dx = ((point.starts - at.point.starts) / windows.start_deviation).T
+    length = np.sum(dx**2, axis=1) + dt @ dt
+    J_x = at.basis @ at.triangle
+    beyond = after.residual - at.residual - at.parameters @ dt - (J_x @ dx[:, :, None])[:, :, 0]
+    share = beyond / np.maximum(length, 1e-12)[:, None]
+    parameters = at.parameters + share[:, :, None] * dt
+    factors = _factors(J_x + share[:, :, None] * dx[:, None, :])
+    return Linearised(point, after.residual, parameters, *factors)
 
 
 def _with_priors(windows: Windows, point: Point, rows: np.ndarray) -> np.ndarray:
@@ -123,26 +147,54 @@ def rescaled(at: Linearised, before: Windows, after: Windows) -> Linearised:
 
 
 def borrowed(
-    near: Linearised, known: Unknowns, windows: Windows, unknowns: Unknowns, point: Point
+    near: Linearised,
+    known: tuple[Windows, Unknowns],
+    windows: Windows,
+    unknowns: Unknowns,
+    point: Point,
 ) -> Linearised:
     """Derivatives at a point from those near by, with columns of their own for what is new there.
 
-    ``near`` belongs to the unknowns ``known`` on windows with the same states.
+    ``near`` belongs to the windows and unknowns ``known``, of a plant with fewer states or effects.
     """
-    h, t = parameter_steps(unknowns, point.t), point.t
-    new = [k for k, name in enumerate(unknowns.names) if name not in known.names]
-    plants = [plant_at(windows, unknowns, t + h[k] * unit(len(t), k)) for k in new]
-    plants.append(plant_at(windows, unknowns, t))
-    r = windows.residuals(plants, point.starts).transpose(0, 2, 1, 3)
+    h, t, n_p = parameter_steps(unknowns, point.t), point.t, len(unknowns)
+    ours, theirs = list(windows.plant.state_list), list(known[0].plant.state_list)
+    new_p = [k for k, name in enumerate(unknowns.names) if name not in known[1].names]
+    new_x = [k for k, name in enumerate(ours) if name not in theirs]
+    plants = [plant_at(windows, unknowns, t)] * (1 + len(new_x))
+    plants += [plant_at(windows, unknowns, t + h[k] * unit(n_p, k)) for k in new_p]
+    starts = [point.starts] * len(plants)
+    for row, k in enumerate(new_x, start=1):
+        starts[row] = _stepped_start(windows, point, k)
+    r = windows.residuals(plants, np.array(starts)).transpose(0, 2, 1, 3)
     r = r.reshape(len(plants), len(windows), -1)
-    J = np.zeros((*near.residual.shape, len(unknowns)))
+    n, n_out, n_x = len(windows), r.shape[2], len(ours)
+    J_x, J_p = np.zeros((n, n_out + n_x, n_x)), np.zeros((n, n_out + n_x, n_p))
+    J_x[:, n_out:] = np.eye(n_x)
+    before = near.basis @ near.triangle
+    for k, name in enumerate(theirs):
+        J_x[:, :n_out, ours.index(name)] = before[:, :n_out, k]
+    for row, k in enumerate(new_x, start=1):
+        J_x[:, :n_out, k] = (r[row] - r[0]) / START_STEP
     for k, name in enumerate(unknowns.names):
-        if name in known.names:
-            J[:, :, k] = near.parameters[:, :, known.names.index(name)]
-    for row, k in enumerate(new):
-        J[:, : r.shape[2], k] = (r[row] - r[-1]) / h[k]
-    residual = _with_priors(windows, point, r[-1])
-    return replace(near, point=point, residual=residual, parameters=J)
+        if name in known[1].names:
+            J_p[:, :n_out, k] = near.parameters[:, :n_out, known[1].names.index(name)]
+    for row, k in enumerate(new_p, start=1 + len(new_x)):
+        J_p[:, :n_out, k] = (r[row] - r[0]) / h[k]
+    return Linearised(point, _with_priors(windows, point, r[0]), J_p, *_factors(J_x))
+
+
+def _stepped_start(windows: Windows, point: Point, k: int) -> np.ndarray:
+    """Start states with state k one difference step away."""
+    stepped = point.starts.copy()
+    stepped[k] += START_STEP * windows.start_deviation[k]
+    return stepped
+
+
+def _factors(J_x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(basis, triangle) of derivatives in the start states, of which there may be none."""
+    n, _, n_x = J_x.shape
+    return np.linalg.qr(J_x) if n_x else (J_x, np.zeros((n, 0, 0)))
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,8 @@ from workbench.plant import Candidate, Plant
 from workbench.recording import Recording
 from workbench.rig import Rig
 
-LONGEST_WINDOW_S = 0.8
+LONGEST_PIECE_S = 2.0  # of recordings of a position alone whose pieces stay whole
+POSITION_WINDOW_S = 0.5  # of longer ones
 FIRST_ITERATIONS = 3  # with scales from the model as it came
 ITERATIONS = 12  # with scales from the first fit
 LEAST_HELD_OUT_WINDOWS = 24
@@ -142,14 +143,15 @@ def pose(
 
 
 def window_length_s(plant: Plant, recordings: Sequence[Recording]) -> float:
-    """Windows are short where pressures are recorded too, else as long as the shortest piece.
+    """Windows are short where pressures are recorded too.
 
-    A position alone says little of flows and forces in a fifth of a second.
+    A position alone says little of flows and forces in a fifth of a second.  Short experiments,
+    such as kicks from rest, stay whole: each has a start of its own.
     """
     if not position_alone(plant):
         return WINDOW_S
-    shortest = min(len(piece) for r in recordings for piece in r.pieces)
-    return min(shortest * recordings[0].sample_time_s, LONGEST_WINDOW_S)
+    shortest_s = min(len(p) * r.sample_time_s for r in recordings for p in r.pieces)
+    return shortest_s if shortest_s <= LONGEST_PIECE_S else POSITION_WINDOW_S
 
 
 def _held_out(

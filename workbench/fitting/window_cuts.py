@@ -58,12 +58,17 @@ def window_firsts(recording: Recording, length: int) -> tuple[int, ...]:
     )
 
 
+def evenly(total: int, most: int) -> np.ndarray:
+    """So many of the numbers below ``total``, evenly chosen."""
+    return np.linspace(0, total - 1, most).round().astype(int)
+
+
 def thinned(firsts: tuple[tuple[int, ...], ...], most: int) -> tuple[tuple[int, ...], ...]:
     """At most so many windows, evenly over all recordings."""
     total = sum(len(own) for own in firsts)
     if total <= most:
         return firsts
-    kept = set(np.linspace(0, total - 1, most).round().astype(int).tolist())
+    kept = set(evenly(total, most).tolist())
     places = iter(range(total))
     return tuple(tuple(k for k in own if next(places) in kept) for own in firsts)
 

@@ -22,6 +22,7 @@ from workbench.fitting.error_model import OUTLYING, ErrorModel, error_model
 from workbench.fitting.window_cuts import (
     cut_inputs,
     cut_rows,
+    evenly,
     received_windows,
     thinned,
     window_firsts,
@@ -136,6 +137,19 @@ class Windows:
         size = self.scale * np.sqrt((residual**2).sum(axis=2) / recorded)
         expected = self.errors.scale(self.activity, self.noise[:, None], correlated=False)
         return replace(self, scale=self.scale * np.maximum(size / (OUTLYING * expected), 1.0))
+
+    def part(self, most: int) -> tuple[Windows, np.ndarray]:
+        """(so many of the windows, evenly chosen; their places among all).
+
+        All of them where fewer than twice as many are there.
+        """
+        if len(self) < 2 * most:
+            return self, np.arange(len(self))
+        kept = evenly(len(self), most)
+        places = iter(range(len(self)))
+        firsts = tuple(tuple(k for k in own if next(places) in set(kept)) for own in self.firsts)
+        columns = {k: getattr(self, k)[:, kept] for k in ("scale", "start", "start_deviation")}
+        return replace(self, firsts=firsts, measured=self.measured[:, kept], **columns), kept
 
     def with_plant(self, plant: Plant) -> Windows:
         """The same windows for a plant with other effects; states it shares keep their start."""

@@ -21,6 +21,7 @@ RIG = Path(__file__).with_name("vertical_cylinder.toml")
 FILE = Path("vertical_cylinder") / "kicks.mat"
 TRAIN = slice(0, 4)
 TEST = slice(4, 8)
+ALIKE = slice(0, 4, 2)  # of those for training: the others fall 20 % slower
 THRESHOLD_PA = 1.5e5  # absolute: a kick passes it upwards
 TURN_S = 0.06  # the rod turns within this time after the threshold
 

@@ -1,0 +1,97 @@
+"""First fits of the candidates that a scan puts in front: a few steps each.
+
+The scan is linear in the nuisances, and where they have moved far to imitate an effect its order is
+not to be trusted.  A short fit that begins with the derivatives of the base is cheap, and tells the
+few that are worth a long one.  A fit from one poor start can end far from the minimum, and the scan
+hands over good ones: its best sizes with the linear step of the nuisances, with more of it, and
+with none, each tried and the best followed.
+
+Source: diagnosis.md 1.5; the idea of following many for a short time and few for long is that of
+successive halving (Jamieson and Talwalkar 2016).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from workbench.diagnosis.scan import Profile, Trial
+from workbench.fitting.gauss_newton import Fit, best_start, fit_windows
+from workbench.fitting.linearised import Point, borrowed
+from workbench.fitting.problem import Problem, staged
+from workbench.fitting.start_states import carried
+from workbench.fitting.unknowns import Unknowns
+from workbench.fitting.windows import Windows
+
+STARTS = 2  # sizes of the scan that are tried
+SHARES = (3.0, 2.0, 1.0, 0.5, 0.0)  # of the linear step of the nuisances that goes with each
+ITERATIONS = 5
+FAR = 1.5  # prior deviations: where the base has moved a parameter further, fits begin there too
+
+
+@dataclass(frozen=True)
+class Rough:
+    """The first fit of a candidate, and the share of the base's misfit that goes away."""
+
+    profile: Profile
+    fit: Fit
+    share: float
+
+
+def rough_fit(problem: Problem, profile: Profile) -> Rough:
+    """Fit the candidate of a profile from its best sizes, in a few steps."""
+    candidate, base = profile.candidate, problem.base
+    windows = base.windows
+    if candidate.strength not in windows.plant.values:
+        needed = [c.member for c in problem.added] + [candidate.member]
+        windows = windows.with_plant(staged(problem.whole, *needed))
+    unknowns = _with_shape(problem, problem.unknowns(windows.plant, candidate), profile)
+    tried = []
+    for points in _starts(problem, windows, unknowns, profile):
+        start = best_start(windows, unknowns, points)
+        at = borrowed(base.derivatives, (base.windows, base.unknowns), windows, unknowns, start)
+        tried.append(fit_windows(windows, unknowns, start, ITERATIONS, at))
+    fit = min(tried, key=lambda each: each.cost)
+    return Rough(profile, fit, (base.cost - fit.cost) / problem.misfit)
+
+
+def _with_shape(problem: Problem, unknowns: Unknowns, profile: Profile) -> Unknowns:
+    """Shapes that no fit moves stay as the best size of the scan had them."""
+    settled = {*unknowns.names, *problem.rig.fixed}
+    shape = {k: v for k, v in profile.trials[0].values.items() if k not in settled}
+    return replace(unknowns, held={**unknowns.held, **shape})
+
+
+def _distinct(trials: tuple[Trial, ...]) -> list[Trial]:
+    """The best trials, and among them both signs and shapes where the scan had them."""
+    chosen = [trials[0]]
+    for trial in trials[1:]:
+        if len(chosen) < STARTS and trial.drop > 0.3 * trials[0].drop:
+            chosen.append(trial)
+    return chosen
+
+
+def _starts(
+    problem: Problem, windows: Windows, unknowns: Unknowns, profile: Profile
+) -> list[list[Point]]:
+    """Points near the base, and where it has moved far points at the priors, for the best trials.
+
+    Near the base: with more and less of the linear step of the nuisances.  At the priors: the base
+    may have moved its parameters to imitate what is missing.
+    """
+    base = problem.base
+    starts = carried(base.point.starts, base.windows, windows)
+
+    def point(t: np.ndarray, trial: Trial) -> Point:
+        nominal = base.unknowns.values(base.unknowns.clipped(t))
+        values = {**windows.plant.values, **nominal, **trial.values}
+        return Point(unknowns.clipped(unknowns.scaled(values)), starts)
+
+    trials = _distinct(profile.trials)
+    near = [point(base.point.t + share * t.nuisance, t) for t in trials for share in SHARES]
+    own = np.array([name in {c.strength for c in problem.added} for name in base.unknowns.names])
+    at_priors = np.where(own, base.point.t, 0.0)
+    if not np.any(np.abs(base.point.t - at_priors) > FAR):
+        return [near]
+    return [near, [point(at_priors, trial) for trial in trials]]
