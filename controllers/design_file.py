@@ -21,8 +21,8 @@ from linearize.modes import HybridModel
 from linearize.standard import standard_modes
 from workbench.contracts import Controller
 from workbench.errors import whole_file
-from workbench.plant import Plant, require
-from workbench.plants import PLANTS
+from workbench.plant import Plant
+from workbench.plant_files import as_it_came, plant_named, plant_text
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ def design(method: str, plant: Plant, numbers: Mapping[str, Any] | None = None) 
 
 def write_design(found: Design, path: Path) -> None:
     """Write a design, and the folder it is to lie in."""
-    text = "\n".join(_lines(found)) + "\n"
+    text = "\n".join(_lines(found, path.parent)) + "\n"
     with whole_file(path) as unfinished:
         unfinished.write_text(text, encoding="utf-8")
 
@@ -80,8 +80,8 @@ def read_design(path: Path) -> Design:
     try:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
         method, place = content["controller"], content["plant"]
-        require([place["name"]], PLANTS, "the list of plants")
-        plant = PLANTS[place["name"]]().without(*place["removed"]).with_values(place["values"])
+        plant = plant_named(place["name"], path.parent)
+        plant = plant.without(*place["removed"]).with_values(place["values"])
         return design(method, plant, content["spec"])
     except tomllib.TOMLDecodeError as error:
         raise ValueError(f"{path.name}: {error}") from error
@@ -91,9 +91,9 @@ def read_design(path: Path) -> Design:
         raise
 
 
-def _lines(found: Design) -> Iterator[str]:
+def _lines(found: Design, folder: Path) -> Iterator[str]:
     plant = found.plant
-    original = PLANTS[plant.name]()
+    original = as_it_came(plant)
     had, has = ({e.name for e in p.effects} for p in (original, plant))
     extra = sorted(has - had)
     if extra:
@@ -101,7 +101,7 @@ def _lines(found: Design) -> Iterator[str]:
     before = original.values
     yield f'controller = "{found.method}"'
     yield "\n[plant]"
-    yield f'name = "{plant.name}"'
+    yield f'name = "{plant_text(plant, folder)}"'
     yield f"removed = [{', '.join(repr(name) for name in sorted(had - has))}]"
     yield "\n[plant.values]"
     for name, value in plant.values.items():

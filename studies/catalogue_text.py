@@ -12,6 +12,7 @@ from studies.text import columns, shown
 from workbench.causes import all_causes, why_not
 from workbench.errors import InputError, Message, listed, nearest
 from workbench.plant import Plant
+from workbench.plant_files import plant_named
 from workbench.plants import PLANTS
 from workbench.rig import parameter_names
 from workbench.units import public_name
@@ -51,10 +52,7 @@ def effects_of_plant_text(name: str) -> str:
     InputError
         If there is no such plant.
     """
-    if name not in PLANTS:
-        known = f"one of {listed(PLANTS)}"
-        raise InputError(Message("there is no such plant", name, known, nearest(name, PLANTS)))
-    plant = PLANTS[name]()
+    plant = plant_named(name)
     rows = []
     for full, candidate in sorted(plant.candidates.items()):
         known, cause = plant.parameters[candidate.strength], candidate.cause

@@ -70,6 +70,7 @@ class Plant:
     that stand before it.  ``measured_inputs`` take the place of what would produce them: where the
     supply pressure is recorded, nothing computes it.  Absent effects stand in the list too: they
     are the catalogue of what the plant may lack, and cost nothing once :meth:`lean` drops them.
+    ``origin`` says where a user's own plant comes from, ``file.py:function``.
     """
 
     name: str
@@ -80,6 +81,7 @@ class Plant:
     optional_inputs: tuple[Signal, ...] = ()
     measured: tuple[str, ...]
     optional_outputs: tuple[str, ...] = ()
+    origin: str = ""
 
     def without(self, *names: str) -> Plant:
         """The same plant with the named effects taken out altogether."""

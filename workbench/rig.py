@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf
 from pathlib import Path
@@ -13,7 +13,7 @@ from workbench.causes import why_not
 from workbench.effect import Parameter
 from workbench.errors import InputError, Message, listed
 from workbench.plant import Plant
-from workbench.plants import PLANTS
+from workbench.plant_files import plant_named
 from workbench.recording import Recording
 from workbench.recording_format import RecordingFormat, default_format, read_format
 from workbench.rig_text import RigText, read_text
@@ -110,7 +110,7 @@ class Rig:
 def default_rig(plant: Plant | str) -> Rig:
     """What a rig file with only a name and a plant gives."""
     if isinstance(plant, str):
-        return load_rig(f'plant = "{plant}"\n')
+        plant = plant_named(plant)
     return Rig(name=plant.name, plant=plant, reader=default_format(plant))
 
 
@@ -126,11 +126,7 @@ def load_rig(path_or_text: Path | str) -> Rig:
     text = RigText(content, str(path) if path else "rig")
     text.keys_among((), text.tree, KEYS)
     name = text.typed(("plant",), str, "", "the name of a plant")
-    if name not in PLANTS:
-        what = "there is no such plant" if name else "a rig file names its plant"
-        text.wrong(("plant",), what, item=name, expected=f"one of {listed(PLANTS)}", known=PLANTS)
-        text.finish()
-    plant = PLANTS[name]()
+    plant = _plant(text, name, path)
     added, removed = _effects(text, plant)
     values = _values(text, plant, removed)
     nulls = {plant.candidates[n].strength for n in removed}
@@ -147,6 +143,16 @@ def load_rig(path_or_text: Path | str) -> Rig:
     )
     text.finish()
     return Rig(plant=plant.with_values(values | absent), **rig)
+
+
+def _plant(text: RigText, name: str, path: Path | None) -> Plant:
+    """The plant that a rig file names; its complaints get the file and the line."""
+    try:
+        return plant_named(name, path.parent if path else None)
+    except InputError as error:
+        line = text.line(("plant",))
+        placed = (replace(each, file=text.file, line=line) for each in error.messages)
+        raise InputError(*text.messages, *placed) from error
 
 
 def parameter_names(plant: Plant) -> dict[str, tuple[str, ...]]:

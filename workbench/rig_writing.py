@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from workbench.errors import whole_file
-from workbench.plants import PLANTS
+from workbench.plant_files import as_it_came, plant_text
 from workbench.recording_format import default_format, format_lines
 from workbench.rig import ACCEPTED, Rig
 from workbench.rig_text import quoted
@@ -19,14 +19,14 @@ def write_rig(rig: Rig, path: Path | str) -> None:
     where that is the plant's own.  The file appears only once it is complete.
     """
     with whole_file(path) as unfinished:
-        unfinished.write_text(rig_text(rig), encoding="utf-8")
+        unfinished.write_text(rig_text(rig, Path(path).parent), encoding="utf-8")
 
 
-def rig_text(rig: Rig) -> str:
-    """The text that :func:`write_rig` writes."""
+def rig_text(rig: Rig, folder: Path | None = None) -> str:
+    """The text that :func:`write_rig` writes; a user's own plant as seen from ``folder``."""
     lines = [ACCEPTED + " ".join(note.split()) for note in rig.notes]
     lines += [""] if lines else []
-    lines += [f"name = {quoted(rig.name)}", f"plant = {quoted(rig.plant.name)}"]
+    lines += [f"name = {quoted(rig.name)}", f"plant = {quoted(plant_text(rig.plant, folder))}"]
     if rig.removed or rig.added:
         lines += ["", "[effects]"]
         lines += [f"remove = {_list(rig.removed)}"] if rig.removed else []
@@ -35,14 +35,14 @@ def rig_text(rig: Rig) -> str:
     lines += _section("uncertainty", {n: written(v, n) for n, v in rig.deviations.items()})
     if rig.fixed:
         lines += ["", "[fixed]", f"names = {_list(sorted(map(public_name, rig.fixed)))}"]
-    if rig.reader != default_format(PLANTS[rig.plant.name]()):
+    if rig.reader != default_format(as_it_came(rig.plant)):
         lines += ["", *format_lines(rig.reader)]
     return "\n".join(lines) + "\n"
 
 
 def _told(rig: Rig) -> dict[str, float]:
     """Values that the file must hold, by full name."""
-    own = PLANTS[rig.plant.name]()
+    own = as_it_came(rig.plant)
     absent = {own.candidates[name].strength for name in rig.removed}
     return {
         name: value

@@ -1,0 +1,123 @@
+"""Plants by name: those of the project's list, and a user's own as ``file.py:function``.
+
+The file is Python: it builds a :class:`workbench.plant.Plant` of the same parts and effects, and
+of effect classes of its own.  It runs as any program of the user does.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import sys
+import traceback
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from hashlib import sha256
+from pathlib import Path
+from types import ModuleType
+
+from workbench.errors import InputError, Message, listed, nearest
+from workbench.plant import Plant
+from workbench.plants import PLANTS
+
+
+def plant_named(name: str, folder: Path | None = None) -> Plant:
+    """The plant of a name in the list, or of ``file.py:function``, the file seen from ``folder``.
+
+    Raises
+    ------
+    InputError
+        If there is no such plant, file or function, or the function gives no plant that works.
+    """
+    file, colon, function = name.rpartition(":")
+    if name in PLANTS:
+        return PLANTS[name]()
+    if not colon or not file.endswith(".py"):
+        what = "there is no such plant" if name else "a rig file names its plant"
+        expected = f"one of {listed(PLANTS)}, or your own as file.py:function"
+        raise InputError(Message(what, name, expected, nearest(name, PLANTS)))
+    path = ((folder or Path()) / file).resolve()
+    if not path.is_file():
+        near = nearest(path.name, (p.name for p in path.parent.glob("*.py")))
+        raise InputError(Message("there is no such file", name, nearest=near))
+    with _blamed(path, name):
+        return replace(_built(_loaded(path), function), origin=f"{path}:{function}")
+
+
+def as_it_came(plant: Plant) -> Plant:
+    """The plant as its name gives it, before anybody set a value."""
+    return plant_named(plant.origin or plant.name)
+
+
+def plant_text(plant: Plant, folder: Path | None = None) -> str:
+    """What a file in ``folder`` calls a plant."""
+    if not plant.origin:
+        return plant.name
+    path, _, function = plant.origin.rpartition(":")
+    try:
+        return f"{Path(os.path.relpath(path, folder or Path())).as_posix()}:{function}"
+    except ValueError:  # another drive
+        return plant.origin
+
+
+def _built(module: ModuleType, function: str) -> Plant:
+    """What a function of a user's file builds, seen to work."""
+    builder: Callable[[], Plant] | None = getattr(module, function, None)
+    if not callable(builder):
+        known = [
+            n for n, v in vars(module).items() if callable(v) and v.__module__ == module.__name__
+        ]
+        what = f"{Path(module.__file__ or '').name} has no such function"
+        near = nearest(function, known)
+        raise InputError(Message(what, function, f"one of {listed(known)}", near))
+    plant = builder()
+    if not isinstance(plant, Plant):
+        kind = type(plant).__name__
+        raise InputError(Message(f"gives a {kind}", f"{function}()", "a workbench.plant.Plant"))
+    names = [member.name for member in plant.members]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise InputError(Message(f"{listed(twice)} stands twice in it", f"{function}()"))
+    _ = plant.model  # what does not fit together shows here, not in the middle of a run
+    return plant
+
+
+def _loaded(path: Path) -> ModuleType:
+    """The module of a file; a file that has not changed is run once."""
+    text = path.read_bytes()
+    name = f"own_plant_{sha256(str(path).encode() + text).hexdigest()[:16]}"
+    if name in sys.modules:
+        return sys.modules[name]
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise InputError(Message("cannot be read as Python", str(path)))
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module  # dataclasses look their module up there
+    sys.path.insert(0, str(path.parent))  # for the modules beside it
+    try:
+        spec.loader.exec_module(module)
+    except BaseException:
+        del sys.modules[name]
+        raise
+    finally:
+        sys.path.remove(str(path.parent))
+    return module
+
+
+@contextmanager
+def _blamed(path: Path, name: str) -> Iterator[None]:
+    """Errors of a user's file as one message with its line there."""
+    try:
+        yield
+    except InputError:
+        raise
+    except SyntaxError as error:
+        what = f"{error.msg}, in line {error.lineno} of {Path(error.filename or path).name}"
+        raise InputError(Message(what, name)) from error
+    except Exception as error:
+        frames = traceback.extract_tb(error.__traceback__)
+        lines = [frame.lineno for frame in frames if frame.filename == str(path)]
+        where = f", in line {lines[-1]} of {path.name}" if lines else ""
+        said = str(error.args[0]) if isinstance(error, KeyError) and error.args else str(error)
+        raise InputError(Message(f"{type(error).__name__}: {said}{where}", name)) from error
