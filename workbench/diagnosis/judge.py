@@ -104,8 +104,9 @@ def tie_group(base: Fit, refits: list[Refit], profiles: dict[str, Profile]) -> l
 
     A candidate is tied when its drop comes within a quarter of the best, or within half of it with
     a signature in the same direction: then only the nuisances decide between the two.  Among the
-    tied those that pass every criterion come first, and among these the held-out recording decides
-    where it does so clearly: the one that leaves at least a fifth less of the misfit there leads.
+    tied those that pass every criterion come first, effects before parameters that would lie far
+    off what is known of them, and among these the held-out recording decides where it does so
+    clearly: the one that leaves at least a fifth less of the misfit there leads.
     """
     best = refits[0]
     tied = [best]
@@ -118,7 +119,8 @@ def tie_group(base: Fit, refits: list[Refit], profiles: dict[str, Profile]) -> l
             tied.append(other)
     tied = tied[:LARGEST_TIE]
     sound = [each for each in tied if not reasons_against(base, each)] or tied
-    best, leader = sound[0], min(sound, key=_left_held_out)
+    effects = [each for each in sound if each.candidate.name in profiles] or sound
+    best, leader = effects[0], min(effects, key=_left_held_out)
     if not _left_held_out(leader) < (1.0 - CLEARLY_LESS) * _left_held_out(best):
         leader = best
     return [leader, *(each for each in tied if each is not leader)]
