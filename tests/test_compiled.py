@@ -5,6 +5,7 @@ import shutil
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from importlib.util import find_spec
 
 import casadi as ca
 import numpy as np
@@ -13,7 +14,8 @@ import pytest
 from workbench import compiled as module
 from workbench.compiled import compiled
 
-HAS_COMPILER = any(map(shutil.which, module.COMPILERS))
+PACKAGED = find_spec("ziglang") is not None
+HAS_COMPILER = any(map(shutil.which, module.COMPILERS)) or PACKAGED
 needs_compiler = pytest.mark.skipif(not HAS_COMPILER, reason="there is no C compiler here")
 
 
@@ -125,6 +127,16 @@ def test_the_compiler_can_be_forbidden(cache, monkeypatch):
     assert not machine_code(compiled(small()))
 
 
+@pytest.mark.skipif(not PACKAGED, reason="the package ziglang is not installed")
+def test_the_compiler_of_a_package_serves_where_the_machine_has_none(cache, tmp_path, monkeypatch):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    function = small()
+    fast = compiled(function)
+
+    assert machine_code(fast)
+    np.testing.assert_array_equal(fast(0.3).full(), function(0.3).full())
+
+
 def command(folder, name, lines):
     """A command of this name, first on the path of whoever prepends the folder."""
     path = folder / name
@@ -154,6 +166,7 @@ def test_a_compiler_that_only_says_how_to_get_one_is_none_and_that_is_said_once(
     cache, tmp_path, monkeypatch, caplog
 ):
     """As /usr/bin/cc on a Mac without its developer tools."""
+    monkeypatch.setattr(module, "find_spec", lambda package: None)
     for name in module.COMPILERS:
         command(tmp_path, name, "echo install the tools >&2\nexit 1\n")
     monkeypatch.setenv("PATH", str(tmp_path))

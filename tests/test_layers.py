@@ -23,6 +23,7 @@ TOOL_FILES = {
     "Makefile",
     "README.md",
     "pyproject.toml",
+    "compiler.lock",
     "requirements.lock",
 }
 SLOW_TO_IMPORT = {"control", "cvxpy", "filterpy", "matplotlib.pyplot"}

@@ -5,7 +5,9 @@ build everything from :meth:`workbench.model.Model.step` first, then compile the
 ``map``, ``mapaccum`` and threads work on compiled functions as on any other, at full speed.
 
 The libraries are kept in the user's cache folder under the hash of their C code, the compiler and
-the flags.  ``CC`` names another compiler, ``WORKBENCH_NO_COMPILER=1`` forbids its use.
+the flags.  ``CC`` names another compiler, ``WORKBENCH_NO_COMPILER=1`` forbids its use.  Where the
+machine has none, that of the package ``ziglang`` serves (Clang with its own headers); ``make``
+installs it there.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ import subprocess
 import sys
 import tempfile
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 
 import casadi as ca
@@ -31,6 +34,7 @@ log = logging.getLogger("workbench")
 FLAGS = ("-fPIC", "-shared", "-ffp-contract=off", "-w", "-Wno-int-conversion")
 LONG_CODE = 300_000  # characters; beyond, -O2 takes twice the time to compile and runs no faster
 COMPILERS = ("cc", "gcc", "clang")
+PACKAGED = (sys.executable, "-m", "ziglang", "cc")
 TIMEOUT_S = 120.0
 
 
@@ -53,9 +57,10 @@ def _compiler(wanted: str, forbidden: str) -> tuple[str, ...]:
     if forbidden not in ("", "0"):
         log.info("WORKBENCH_NO_COMPILER is set: functions run in CasADi's virtual machine")
         return ()
-    for command in (shlex.split(wanted), *([name] for name in COMPILERS)):
-        if command and _version(tuple(command)):
-            return tuple(command)
+    packaged = (PACKAGED,) if find_spec("ziglang") else ()
+    for command in (tuple(shlex.split(wanted)), *((name,) for name in COMPILERS), *packaged):
+        if command and _version(command):
+            return command
     log.info("no C compiler works here: functions run in CasADi's virtual machine, which is slower")
     return ()
 
@@ -91,7 +96,7 @@ def _compile(code: str, library: Path, command: tuple[str, ...]) -> None:
         source, made = Path(aside, "source.c"), Path(aside, library.name)
         source.write_text(code, encoding="utf-8")
         arguments = [*command, *strict, str(source), "-o", str(made), "-lm"]
-        subprocess.run(arguments, capture_output=True, text=True, check=True, timeout=TIMEOUT_S)
+        _run(arguments).check_returncode()
         os.replace(made, library)
 
 
@@ -105,10 +110,17 @@ def _version(compiler: tuple[str, ...]) -> str:
         return ""
     command = [*compiler, "--version"]
     try:
-        answer = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT_S)
+        answer = _run(command)
     except (OSError, subprocess.SubprocessError):
         return ""
     return "" if answer.returncode else answer.stdout + answer.stderr
+
+
+def _run(command: list[str]) -> subprocess.CompletedProcess[str]:
+    """Run a compiler; that of the package keeps what it makes once beside our folder."""
+    beside = _folder().with_name(f"{_folder().name}-zig")
+    kept = {"ZIG_GLOBAL_CACHE_DIR": str(beside), **os.environ}
+    return subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT_S, env=kept)
 
 
 @cache

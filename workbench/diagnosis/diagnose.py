@@ -87,7 +87,7 @@ def diagnose(
     ranking = ranked(problem, profiles, refits, moved)
     progress("where it fails")
     where = locate(problem, train)
-    law = _law(problem, ranking, progress)
+    law = _law(problem, ranking, profiles, progress)
     verdict = _verdict(ranking, law, held_out)
     best = next((r for r in refits if ranking and r.candidate == ranking[0].candidate), None)
     if best and not best.fit.converged:
@@ -161,7 +161,9 @@ def _scanned(problem: Problem) -> list[Profile]:
     return scan(problem.whole, base.windows, base.unknowns, base.point, absent, at)
 
 
-def _law(problem: Problem, ranking: tuple[Ranked, ...], progress: Progress) -> Law | None:
+def _law(
+    problem: Problem, ranking: tuple[Ranked, ...], profiles: list[Profile], progress: Progress
+) -> Law | None:
     """An empirical law, unless an effect of the catalogue explains most of the misfit already.
 
     A parameter that leaves its prior is no such effect: it may well imitate the law.  So the law
@@ -172,7 +174,8 @@ def _law(problem: Problem, ranking: tuple[Ranked, ...], progress: Progress) -> L
     if leader and certain and leader.drop_train >= CERTAIN_SHARE:
         return None
     progress("empirical law")
-    law = empirical_law(problem)
+    led_by = [p.drop for p in profiles if certain and leader and p.candidate == leader.candidate]
+    law = empirical_law(problem, max(led_by, default=0.0))
     followed = [r for r in ranking if r.fit is not None and predicts_row(r)]
     effect, shift = (
         max((r.drop_train for r in followed if r.kind is kind), default=0.0)

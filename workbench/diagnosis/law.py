@@ -28,14 +28,18 @@ MOST_TERMS = 3
 LEAST_TERM_SHARE = 0.10  # of the misfit that another term must take
 
 
-def empirical_law(problem: Problem) -> Law | None:
-    """The law of the balance that gains most and passes every criterion; None where none does."""
+def empirical_law(problem: Problem, to_beat: float = 0.0) -> Law | None:
+    """The law of the balance that gains most and passes every criterion; None where none does.
+
+    None, too, where the scan of its first term promises less than ``to_beat``, which the scan of
+    an effect promised.
+    """
     problem = _with_terms(problem)
     first = problem
     accepted: list[Candidate] = []
     best: Refit | None = None
     for _ in range(MOST_TERMS):
-        found = _next_term(problem, accepted)
+        found = _next_term(problem, accepted, 0.0 if accepted else to_beat)
         if not found or found.drop_train * misfit(problem.base) < LEAST_TERM_SHARE * first.misfit:
             break
         counted = _counted_from(first, found)
@@ -82,7 +86,7 @@ def _middle(problem: Problem, body: Body) -> float:
     return float((np.nanmin(values) + np.nanmax(values)) / 2)
 
 
-def _next_term(problem: Problem, accepted: list[Candidate]) -> Refit | None:
+def _next_term(problem: Problem, accepted: list[Candidate], to_beat: float) -> Refit | None:
     """The refit of the term that the scan puts first, on top of those accepted."""
     at = problem.base
     left = [

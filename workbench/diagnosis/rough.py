@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from workbench.diagnosis.scan import Profile, Trial
-from workbench.fitting.gauss_newton import Fit, best_start, fit_windows
+from workbench.fitting.gauss_newton import Fit, fit_windows, points_costs
 from workbench.fitting.linearised import Point, borrowed
 from workbench.fitting.problem import Problem, staged
 from workbench.fitting.start_states import carried
@@ -25,8 +25,9 @@ from workbench.fitting.unknowns import Unknowns
 from workbench.fitting.windows import Windows
 
 STARTS = 2  # sizes of the scan that are tried
-SHARES = (3.0, 2.0, 1.0, 0.5, 0.0)  # of the linear step of the nuisances that goes with each
-ITERATIONS = 5
+SHARES = (2.0, 1.0, 0.5, 0.0)  # of the linear step of the nuisances that goes with each
+ITERATIONS = 4
+WORTH_TRYING = 3.0  # times the cost of the best start
 FAR = 1.5  # prior deviations: where the base has moved a parameter further, fits begin there too
 
 
@@ -47,9 +48,13 @@ def rough_fit(problem: Problem, profile: Profile) -> Rough:
         needed = [c.member for c in problem.added] + [candidate.member]
         windows = windows.with_plant(staged(problem.whole, *needed))
     unknowns = _with_shape(problem, problem.unknowns(windows.plant, candidate), profile)
+    begun = [
+        points_costs(windows, unknowns, points).best
+        for points in _starts(problem, windows, unknowns, profile)
+    ]
+    most = WORTH_TRYING * min(each.cost for each in begun)
     tried = []
-    for points in _starts(problem, windows, unknowns, profile):
-        start = best_start(windows, unknowns, points)
+    for start in (each.point for each in begun if each.cost <= most):
         at = borrowed(base.derivatives, (base.windows, base.unknowns), windows, unknowns, start)
         tried.append(fit_windows(windows, unknowns, start, ITERATIONS, at))
     fit = min(tried, key=lambda each: each.cost)

@@ -41,6 +41,8 @@ class EmpiricalForce(Effect):
 
     F = -a v |v| - b v^3 - c v |x - x_m| + e (x - x_m)^2
 
+    What grows with a power of the speed may drive the body only a little: it would run away.
+
     Source: diagnosis.md 1.9.
     """
 
@@ -53,8 +55,8 @@ class EmpiricalForce(Effect):
 
     body: str
     middle_m: float = 0.0
-    quadratic_n_s2_m2: Expression = strength(typical=300.0, lower=-1e5, upper=1e5)
-    cubic_n_s3_m3: Expression = strength(typical=500.0, lower=-1e5, upper=1e5)
+    quadratic_n_s2_m2: Expression = strength(typical=300.0, lower=-30.0, upper=1e5)
+    cubic_n_s3_m3: Expression = strength(typical=500.0, lower=-15.0, upper=1e5)
     placed_viscous_n_s_m2: Expression = strength(typical=500.0, lower=-1e5, upper=1e5)
     curved_n_m2: Expression = strength(typical=2000.0, lower=-1e6, upper=1e6)
 
