@@ -178,17 +178,20 @@ class Plant:
         """Initial state, shape (n_x,)."""
         return np.array([float(s.initial) for s in self.state_list.values()])
 
-    @property
+    @cached_property
     def scale(self) -> np.ndarray:
-        """Typical size of each state, shape (n_x,)."""
-        return np.array([s.scale for s in self.state_list.values()])
+        """Typical size of each state, shape (n_x,), not to be written to."""
+        return _read_only(s.scale for s in self.state_list.values())
 
-    @property
+    @cached_property
     def nominal(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Nominal commands, measured inputs and parameters: shapes (n_u,), (n_d,) and (n_p,)."""
-        u = np.array([signal.nominal for signal in self.commands])
-        d = np.array([signal.nominal for signal in self.measured_inputs])
-        return u, d, np.array([*self.values.values()], dtype=float)
+        """Nominal commands, measured inputs and parameters: shapes (n_u,), (n_d,) and (n_p,).
+
+        They are asked for at every sample of a loop, and so kept; not to be written to.
+        """
+        u = _read_only(signal.nominal for signal in self.commands)
+        d = _read_only(signal.nominal for signal in self.measured_inputs)
+        return u, d, _read_only(self.values.values())
 
     @cached_property
     def model(self) -> Model:
@@ -268,6 +271,12 @@ def require(names: Iterable[str], known: Iterable[str], owner: str) -> None:
 def _shared(cause: Cause, plant: Plant) -> bool:
     """True when several members carry this cause, so that its name needs a place."""
     return sum(c.name == cause.name for m in plant.members for c in m.causes) > 1
+
+
+def _read_only(values: Iterable[float]) -> np.ndarray:
+    found = np.array([*values], dtype=float)
+    found.flags.writeable = False
+    return found
 
 
 def _symbols(names: Iterable[str]) -> dict[str, ca.SX]:
