@@ -33,7 +33,7 @@ from workbench.fitting.unknowns import Unknowns
 from workbench.fitting.windows import Windows
 from workbench.plant import Candidate, Plant
 
-MOST_WINDOWS = 24  # that a scan looks at
+FEWEST_WINDOWS = 24  # that a scan looks at; half of them where there are more
 LARGEST_STEP = 6.0  # prior deviations a nuisance may move in one linear step
 
 
@@ -144,11 +144,11 @@ def scan(
 
     ``whole`` is the windows' plant with all absent effects in their places.  Candidates with
     states of their own are run on a plant that has them; the others share one.  ``at`` are the
-    derivatives at the point where they are known already.  Where there are many windows, every
-    so many-th is enough to tell candidates apart; drops count as of all.
+    derivatives at the point where they are known already.  Every second window is enough to tell
+    candidates apart where there are many; drops count as of all.
     """
     total = len(windows)
-    windows, kept = windows.part(MOST_WINDOWS)
+    windows, kept = windows.part(max(total // 2, FEWEST_WINDOWS))
     of_all = total / len(windows)
     point, at = replace(point, starts=point.starts[:, kept]), at.part(kept) if at else None
     metric = metric_at(windows, unknowns, point, at)
