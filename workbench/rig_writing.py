@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from workbench.errors import whole_file
+from workbench.plant import Plant
 from workbench.plant_files import as_it_came, plant_text
 from workbench.recording_format import default_format, format_lines
 from workbench.rig import ACCEPTED, Rig
@@ -24,6 +25,7 @@ def write_rig(rig: Rig, path: Path | str) -> None:
 
 def rig_text(rig: Rig, folder: Path | None = None) -> str:
     """The text that :func:`write_rig` writes; a user's own plant as seen from ``folder``."""
+    own = as_it_came(rig.plant)
     lines = [ACCEPTED + " ".join(note.split()) for note in rig.notes]
     lines += [""] if lines else []
     lines += [f"name = {quoted(rig.name)}", f"plant = {quoted(plant_text(rig.plant, folder))}"]
@@ -31,18 +33,17 @@ def rig_text(rig: Rig, folder: Path | None = None) -> str:
         lines += ["", "[effects]"]
         lines += [f"remove = {_list(rig.removed)}"] if rig.removed else []
         lines += [f"add = {_list(rig.added)}"] if rig.added else []
-    lines += _section("values", {n: written(v, n) for n, v in _told(rig).items()})
+    lines += _section("values", {n: written(v, n) for n, v in _told(rig, own).items()})
     lines += _section("uncertainty", {n: written(v, n) for n, v in rig.deviations.items()})
     if rig.fixed:
         lines += ["", "[fixed]", f"names = {_list(sorted(map(public_name, rig.fixed)))}"]
-    if rig.reader != default_format(as_it_came(rig.plant)):
+    if rig.reader != default_format(own):
         lines += ["", *format_lines(rig.reader)]
     return "\n".join(lines) + "\n"
 
 
-def _told(rig: Rig) -> dict[str, float]:
-    """Values that the file must hold, by full name."""
-    own = as_it_came(rig.plant)
+def _told(rig: Rig, own: Plant) -> dict[str, float]:
+    """Values that the file must hold, by full name, beside those of the plant as it came."""
     absent = {own.candidates[name].strength for name in rig.removed}
     return {
         name: value

@@ -1,6 +1,6 @@
 """One round of diagnosis: which physical effect is missing.
 
-Prior fit, projected profile scan over the catalogue, first fits of the ten that it puts in front,
+Prior fit, projected profile scan over the catalogue, first fits of the few that it puts in front,
 refits of the best few, judgement on a held-out recording, ties, and the verdict in words.  Nothing
 is changed and nothing is written.
 
@@ -174,7 +174,7 @@ def _law(
     if leader and certain and leader.drop_train >= CERTAIN_SHARE:
         return None
     progress("empirical law")
-    led_by = [p.drop for p in profiles if certain and leader and p.candidate == leader.candidate]
+    led_by = (p.drop for p in profiles if certain and p.candidate == leader.candidate)
     law = empirical_law(problem, max(led_by, default=0.0))
     followed = [r for r in ranking if r.fit is not None and predicts_row(r)]
     effect, shift = (

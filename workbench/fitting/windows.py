@@ -146,8 +146,7 @@ class Windows:
         if len(self) < 2 * most:
             return self, np.arange(len(self))
         kept = evenly(len(self), most)
-        places = iter(range(len(self)))
-        firsts = tuple(tuple(k for k in own if next(places) in set(kept)) for own in self.firsts)
+        firsts = thinned(self.firsts, most)
         columns = {k: getattr(self, k)[:, kept] for k in ("scale", "start", "start_deviation")}
         return replace(self, firsts=firsts, measured=self.measured[:, kept], **columns), kept
 
