@@ -1,5 +1,7 @@
 """What every estimator must do, and what ours must equal on a linear plant."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from linear_plant import cart
@@ -11,6 +13,7 @@ from workbench.filtering import (
     consistent_start,
     correct,
     filter_pass,
+    log_likelihoods,
     predict,
     recording_filter,
     smooth,
@@ -242,6 +245,22 @@ def test_the_true_plant_is_likelier(recorded):
     likelihoods = [filter_pass(each, part).log_likelihood for each in filters]
 
     assert likelihoods[0] > likelihoods[1] + 10.0
+
+
+def test_intensities_side_by_side_are_as_likely_as_one_after_the_other(recorded):
+    _, _, recording = recorded
+    part = replace(recording.part(0, 600), starts=(0, 250))
+    process = {"chamber_a.pressure_pa": 1e3}
+    walks = {VELOCITY: 2.0, "chamber_b.pressure_pa": 1e5}
+    tried = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 3.0]])
+
+    many = recording_filter(servo_drive(), part, walks, process_noise=process, decimate=4)
+    found = log_likelihoods(many, part, tried)
+
+    for likelihood, factors in zip(found, tried.T, strict=True):
+        alone = {n: q * f for (n, q), f in zip(walks.items(), factors, strict=True) if f}
+        known = recording_filter(servo_drive(), part, alone, process_noise=process, decimate=4)
+        assert likelihood == pytest.approx(filter_pass(known, part).log_likelihood, abs=1e-6)
 
 
 def test_a_start_keeps_the_gas_at_its_temperature():

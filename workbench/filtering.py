@@ -8,6 +8,7 @@ Source: Särkkä 2013, "Bayesian filtering and smoothing", algorithms 5.4 and 8.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -138,6 +139,28 @@ def smooth(found: PlantFilter, recording: Recording) -> FilterResult:
     return _joined(found, [_smoothed(_run(found, piece)) for piece in recording.pieces])
 
 
+def log_likelihoods(found: PlantFilter, recording: Recording, factors: np.ndarray) -> np.ndarray:
+    """Log-likelihood of a recording at several intensities of the unknown inputs, side by side.
+
+    ``factors`` (n_w, n) multiply the intensities of ``found``; 0 switches an input off.  Returns
+    shape (n,), not finite where a run was lost.
+    """
+    n_w, n = factors.shape
+    sizes = np.vstack([np.ones((len(found.scale) - n_w, n)), factors]).T
+    P, Q = (
+        np.array([(covariance * np.outer(size, size)).ravel() for size in sizes]).T
+        for covariance in (found.start_covariance, found.step_covariance)
+    )
+    total = np.zeros((1, n))
+    for piece in recording.pieces:
+        start, columns = _posed(found, piece)
+        run = found.likelihood.fold(columns[-1].shape[1])
+        runs = run.map(n, "thread", min(n, os.cpu_count() or 1))
+        now = np.vstack([np.tile(start[:, None], n), P, Q, total])
+        total = runs(now, *(np.tile(each, n) for each in columns)).full()[-1:]
+    return total.ravel()
+
+
 def recording_filter(
     plant: Plant,
     recording: Recording,
@@ -186,8 +209,8 @@ class _Pass:
     log_likelihood: float
 
 
-def _run(found: PlantFilter, piece: Recording) -> _Pass:
-    """The filter over one gap-free piece."""
+def _posed(found: PlantFilter, piece: Recording) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
+    """Start, and by sample of the filter the columns u, d, p, y and received."""
     plant, m = found.plant, found.decimate
     u, d = inputs(plant, piece)
     n = max(len(piece) // m, 1)
@@ -202,11 +225,17 @@ def _run(found: PlantFilter, piece: Recording) -> _Pass:
     }
     start = np.zeros(len(found.scale))
     start[: len(plant.scale)] = consistent_start(plant, first) / plant.scale
-    many = found.sample.mapaccum("filter", n, 2)
-    values = plant.nominal[2]
-    y = np.where(received, y, 0.0)
-    columns = many(start, found.start_covariance, u, d, values, y, received)
-    _, _, F, X, P, e, deviation, likely, said, weights, left = (v.full() for v in columns)
+    values = np.tile(plant.nominal[2][:, None], n)
+    return start, (u, d, values, np.where(received, y, 0.0), received)
+
+
+def _run(found: PlantFilter, piece: Recording) -> _Pass:
+    """The filter over one gap-free piece."""
+    start, columns = _posed(found, piece)
+    received = columns[-1]
+    many = found.sample.mapaccum("filter", received.shape[1], 2)
+    results = many(start, found.start_covariance, *columns, found.step_covariance)
+    _, _, F, X, P, e, deviation, likely, said, weights, left = (v.full() for v in results)
     return _Pass(
         X=X.T,
         P=_stacked(P),

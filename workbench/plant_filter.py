@@ -85,14 +85,33 @@ class PlantFilter:
     @cached_property
     def start_covariance(self) -> np.ndarray:
         """Covariance of X before the first measurement, shape (n_x + n_w, n_x + n_w)."""
-        n_w, states = len(self.unknown_inputs), self.plant.model.states
-        pairs = zip(states, self.plant.scale, strict=True)
-        deviation = [self.initial_deviation.get(name, size) / size for name, size in pairs]
-        return np.diag(np.array([*deviation, *[1.0] * n_w]) ** 2)
+        pairs = zip(self.plant.model.states, self.plant.scale, strict=True)
+        return self._diagonal(
+            [self.initial_deviation.get(name, size) / size for name, size in pairs]
+        )
+
+    @cached_property
+    def step_covariance(self) -> np.ndarray:
+        """Covariance that X gains in a step of the filter, shape (n_x + n_w, n_x + n_w)."""
+        pairs = zip(self.plant.model.states, self.plant.scale, strict=True)
+        gained = self._diagonal([self.process_noise.get(name, 0.0) / size for name, size in pairs])
+        return gained * self.sample_time_s * self.decimate
+
+    def _diagonal(self, of_states: list[float]) -> np.ndarray:
+        """Variances from standard deviations of the scaled states; 1 for unknown inputs."""
+        return np.diag(np.array([*of_states, *[1.0] * len(self.unknown_inputs)]) ** 2)
 
     @cached_property
     def predict(self) -> ca.Function:
         """(X, P, u, d, p) -> (X, P, F) one step later; u and d have one column per sample."""
+        sizes = [self._predict.size_in(i) for i in range(5)]
+        symbols = [ca.MX.sym(f"i{i}", *size) for i, size in enumerate(sizes)]
+        results = self._predict(*symbols, self.step_covariance)
+        return ca.Function("predict", symbols, results)
+
+    @cached_property
+    def _predict(self) -> ca.Function:
+        """(X, P, u, d, p, Q) -> (X, P, F) with what X gains in a step."""
         plant, model, h = self.plant, self.plant.model, self.sample_time_s * self.decimate
         n, n_w = len(model.states), len(self.unknown_inputs)
         X, P = ca.MX.sym("X", n + n_w), ca.MX.sym("P", n + n_w, n + n_w)
@@ -105,14 +124,13 @@ class PlantFilter:
         A = A * np.outer(1 / plant.scale, plant.scale)
         coupling = E * np.outer(1 / plant.scale, S[n:])
         F = transition(ca.blockcat([[A, coupling], [ca.MX(n_w, n), ca.MX(n_w, n_w)]]), h)
-        noise = [self.process_noise.get(name, 0.0) for name in model.states]
-        Q = ca.diag(np.array([*(noise / plant.scale), *[1.0] * n_w]) ** 2 * h / 2)
+        Q = ca.MX.sym("Q", n + n_w, n + n_w)
         step = self._step
         for k in range(self.decimate):
             x = step(x, u[:, k], d[:, k], ca.vertcat(p, w))
         later = ca.vertcat(x / plant.scale, X[n:])
-        P_later = F @ (P + Q) @ F.T + Q
-        return ca.Function("predict", [X, P, u, d, p], [later, P_later, F])
+        P_later = F @ (P + Q / 2) @ F.T + Q / 2
+        return ca.Function("predict", [X, P, u, d, p, Q], [later, P_later, F])
 
     @cached_property
     def correct(self) -> ca.Function:
@@ -148,17 +166,38 @@ class PlantFilter:
     def sample(self) -> ca.Function:
         """One sample: correct what was predicted for it, then predict the next.
 
-        (X, P, u, d, p, y, received) with X and P predicted ->
+        (X, P, u, d, p, y, received, Q) with X and P predicted and Q what X gains in a step ->
         (X and P predicted for the next sample, F, then what :attr:`correct` gives)
         """
-        once = self.correct
-        columns = [once.size2_in(i) for i in range(once.n_in())]
-        columns[2:4] = self.decimate, self.decimate
-        symbols = [ca.MX.sym(f"i{i}", once.size1_in(i), m) for i, m in enumerate(columns)]
+        once, following = self.correct, self._predict
+        symbols = [ca.MX.sym(f"i{i}", *once.size_in(i)) for i in range(once.n_in())]
+        symbols[2:4] = (ca.MX.sym(k, *following.size_in(i)) for i, k in ((2, "u"), (3, "d")))
         X, P, u, d, p, y, received = symbols
+        Q = ca.MX.sym("Q", *following.size_in(5))
         now = once(X, P, u[:, 0], d[:, 0], p, y, received)
-        following = self.predict(now[0], now[1], u, d, p)
-        return ca.Function("sample", [X, P, u, d, p, y, received], [*following, *now])
+        later = following(now[0], now[1], u, d, p, Q)
+        return ca.Function("sample", [*symbols, Q], [*later, *now])
+
+    @cached_property
+    def likelihood(self) -> ca.Function:
+        """:attr:`sample` for its log-likelihood alone: (now, u, d, p, y, received) -> later.
+
+        Both hold X, P, Q and the sum of the log-likelihood, column by column in one vector.
+        """
+        *symbols, Q = (ca.MX.sym(f"i{i}", *self.sample.size_in(i)) for i in range(8))
+        X, P, *inputs = symbols
+        before = ca.MX.sym("before")
+        later = self.sample(*symbols, Q)
+        now = ca.veccat(X, P, Q, before)
+        once = ca.Function(
+            "once", [X, P, Q, before, *inputs], [ca.veccat(*later[:2], Q, before + later[7])]
+        )
+        packed = ca.MX.sym("now", now.numel())
+        parts = ca.vertsplit(packed, np.cumsum([0, *(v.numel() for v in (X, P, Q, before))]))
+        unpacked = (
+            ca.reshape(v, *to.shape) for v, to in zip(parts, (X, P, Q, before), strict=True)
+        )
+        return ca.Function("likelihood", [packed, *inputs], [once(*unpacked, *inputs)])
 
     @cached_property
     def _outputs(self) -> ca.Function:

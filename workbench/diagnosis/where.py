@@ -10,7 +10,7 @@ Source: diagnosis.md 1.3; Kristensen, Madsen and Jorgensen 2004 (significant dif
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +18,7 @@ import numpy as np
 from workbench.air import HEAT_CAPACITY_RATIO
 from workbench.comparison.regimes import regime_shares
 from workbench.diagnosis.result import Dependence, Where
-from workbench.filtering import FilterResult, filter_pass, recording_filter, smooth
+from workbench.filtering import FilterResult, log_likelihoods, recording_filter, smooth
 from workbench.fitting.problem import Problem
 from workbench.linkage import Joint, Link
 from workbench.parts import Body, Chamber
@@ -68,19 +68,7 @@ def locate(problem: Problem, recordings: Sequence[Recording]) -> Where | None:
     def lacking(unknown: dict[str, float]) -> PlantFilter:
         return recording_filter(plant, recording, unknown, noise, always, decimate)
 
-    plain = filter_pass(lacking({}), recording).log_likelihood
-    if not np.isfinite(plain):
-        return None
-    gains = {}
-    for suspect in suspects:
-        runs = {
-            q: filter_pass(lacking({suspect.state: q}), recording)
-            for q in INTENSITIES[suspect.state.rpartition(".")[2]]
-        }
-        finite = [q for q in runs if np.isfinite(runs[q].log_likelihood)]
-        if finite:
-            best = max(finite, key=lambda q: runs[q].log_likelihood)
-            gains[suspect] = (runs[best].log_likelihood - plain, best)
+    gains = _gains(suspects, lacking, recording)
     if not gains:
         return None
     worst = max(gains, key=lambda s: gains[s][0])
@@ -88,7 +76,7 @@ def locate(problem: Problem, recordings: Sequence[Recording]) -> Where | None:
     term = result.unknown[0] * worst.factor
     return Where(
         balance=worst.balance,
-        by_balance={s.balance: float(gain) for s, (gain, _) in gains.items()},
+        by_balance={s.balance: gain for s, (gain, _) in gains.items()},
         term_name=worst.term_name,
         time_s=result.time_s,
         term=term,
@@ -96,6 +84,24 @@ def locate(problem: Problem, recordings: Sequence[Recording]) -> Where | None:
         against=_dependences(plant, recording, result, term, decimate),
         by_regime=regime_shares(problem.base),
     )
+
+
+def _gains(
+    suspects: list[Suspect],
+    lacking: Callable[[dict[str, float]], PlantFilter],
+    recording: Recording,
+) -> dict[Suspect, tuple[float, float]]:
+    """Log-likelihood that each suspect gains over a model without it, and at which intensity."""
+    intensities = {s: INTENSITIES[s.state.rpartition(".")[2]] for s in suspects}
+    trials = [(s, q) for s in suspects for q in intensities[s]]
+    known = lacking({s.state: intensities[s][0] for s in suspects})
+    factors = [[q / intensities[s][0] * (s is each) for s, q in trials] for each in suspects]
+    plain, *likely = log_likelihoods(known, recording, np.pad(factors, ((0, 0), (1, 0))))
+    gains: dict[Suspect, tuple[float, float]] = {}
+    for (suspect, q), gain in zip(trials, likely - plain, strict=True):
+        if np.isfinite(gain) and gain > gains.get(suspect, (-np.inf, q))[0]:
+            gains[suspect] = float(gain), q
+    return gains
 
 
 def _suspects(plant: Plant) -> list[Suspect]:
