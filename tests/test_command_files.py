@@ -118,5 +118,5 @@ def test_few_samples_are_enough_to_simulate_and_too_few_to_fit(folder, tmp_path)
         answer = call(command, rig, *words)
 
         assert answer.exit_code == 2, command
-        assert "10 samples are fewer than the 21 parameters of servo_drive" in answer.stderr
+        assert "10 samples are fewer than the 17 parameters of servo_drive" in answer.stderr
     assert [p.name for p in tmp_path.iterdir()] == ["short.csv"]

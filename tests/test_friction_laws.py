@@ -8,11 +8,14 @@ import pytest
 
 from workbench.effect import Effect, Force
 from workbench.effects.bristle_friction import ElastoPlastic, LuGre
+from workbench.fitting.starts import guessed_states
 from workbench.parts import Body
 from workbench.plant import Plant, Signal
 from workbench.plants.servo_drive import servo_drive
 from workbench.recording import Recording
 from workbench.simulation import simulate
+
+WARMTH = "friction_thermal.warmer_k"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,3 +54,17 @@ def test_the_bristle_is_symbolic_too():
 
     assert LuGre()(z, z, z) == 1.0
     assert ElastoPlastic()(z, z, z).is_scalar()
+
+
+def test_a_seal_is_guessed_as_warm_as_its_strokes_make_it():
+    values = {"friction_thermal.softening_n_k": 0.5, "friction_thermal.warming_time_s": 30.0}
+    plant = servo_drive().with_values(values).lean()
+    command = 4.95 + 1.5 * np.sign(np.sin(np.pi * 1e-3 * np.arange(20_000)))
+    run = simulate(plant, Recording("strokes", 1e-3, {"valve.command_v": command}))
+
+    guess, deviation = guessed_states(plant, run)
+    row = plant.model.states.index(WARMTH)
+
+    assert run[WARMTH][-1] > 1.0
+    assert np.abs(guess - run[WARMTH])[row].max() < 0.05 * run[WARMTH][-1]
+    assert (deviation[row] < 1.0).all()

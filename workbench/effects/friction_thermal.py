@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import casadi as ca
+import numpy as np
 
 from workbench.effect import (
     Balance,
@@ -19,6 +20,8 @@ from workbench.effect import (
     form,
     strength,
 )
+
+GUESSED_K = 0.1  # standard deviation of a seal's warmth where the strokes before are recorded
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,6 +59,18 @@ class ThermalFriction(Effect):
 
     def states(self) -> Iterator[State]:
         yield State("warmer_k", initial=0.0, scale=10.0)
+
+    def guess(self, seen: Mapping[str, np.ndarray]) -> dict[str, tuple[np.ndarray | float, float]]:
+        """As warm as the recorded strokes make a seal that was cold when the recording began."""
+        from scipy.signal import lfilter
+
+        speed = seen.get(f"{self.body}.velocity_m_s")
+        if speed is None:
+            return {}
+        step_s = float(np.diff(seen["time_s"][:2]).sum())
+        heating_k_m, kept = self.heating_k_j * self.rubbing_force_n, -step_s / self.warming_time_s
+        warmer_k = lfilter([heating_k_m * step_s], [1.0, -np.exp(kept)], np.abs(speed))
+        return {"warmer_k": (warmer_k, GUESSED_K)}
 
     def terms(self, now: Conditions) -> Iterator[Force]:
         side = ca.tanh(self.steepness_s_m * now[self.body].velocity_m_s)

@@ -57,7 +57,8 @@ class InputPressure:
         inlet_pa = outside.pressure_pa + share * (supply.pressure_pa - outside.pressure_pa)
         ends = (inlet_pa, supply.temperature_k, gas.pressure_pa, gas.temperature_k)
         path = Path(*ends, valve.gas_constant_j_kg_k)
-        into_kg_s = path.flow_kg_s(valve.equivalent_area_m2(offset_v), NozzleLaw())
+        hole_m2 = valve.equivalent_area_m2(offset_v)
+        into_kg_s = gas.line_share * path.flow_kg_s(hole_m2, NozzleLaw())
         yield MassFlow(chamber, into_kg_s, path.temperature_k)
         yield MassFlow("supply", -share * into_kg_s, path.temperature_k)
 
@@ -77,15 +78,9 @@ class TwoFlows:
     def __call__(
         self, valve: ProportionalValve, chamber: str, offset_v: Expression, now: Conditions
     ) -> Iterator[MassFlow]:
-        charge = path_between(now["supply"], now[chamber], valve.gas_constant_j_kg_k)
-        vent = path_between(now[chamber], now["atmosphere"])
         supplied_m2 = valve.charging_coefficient * self._opened_m2(valve, offset_v)
         vented_m2 = valve.discharging_coefficient * self._opened_m2(valve, -offset_v)
-        into_kg_s = charge.flow_kg_s(supplied_m2, NozzleLaw())
-        out_kg_s = vent.flow_kg_s(vented_m2, NozzleLaw())
-        yield MassFlow(chamber, into_kg_s, charge.temperature_k)
-        yield MassFlow("supply", -into_kg_s, charge.temperature_k)
-        yield MassFlow(chamber, -out_kg_s, vent.temperature_k)
+        yield from valve.through(chamber, supplied_m2, vented_m2, now)
 
     @staticmethod
     def _opened_m2(valve: ProportionalValve, offset_v: Expression) -> Expression:
@@ -105,7 +100,8 @@ class ProportionalValve(Effect):
     ``area_shape_share`` s turns a linear area (0) into the segment of a circle (1).  With
     ``underlap_v`` = 0, s = 0 and c_2 = 0 this is the plain model that paper 000 compares with:
     linear area and fixed pressures.  ``underlap`` says how the ports overlap near the centre.
-    Flow direction follows the pressures (erratum E000-4).
+    Flow direction follows the pressures (erratum E000-4).  A worn spool leaks from the supply to
+    each chamber and from there to the exhaust, whatever the command.
 
     Source: paper 000 Eqs. 8 to 10, values of physics.md 2.1; sizes of the hole, span and discharge
     coefficients are chosen there.  Paper 001 prints a coefficient of 0.016, which is none (E001-2).
@@ -153,6 +149,14 @@ class ProportionalValve(Effect):
             shown_by="fills from ambient at several openings",
             source="interface.md section 6 (supply_restriction)",
         ),
+        Cause(
+            name="spool_leak",
+            strength="leak_area_m2",
+            balance=Balance.MASS,
+            drivers=("pressures while the valve is at its centre",),
+            shown_by="piston held at the centre, from two different pressures",
+            source="physics.md section 6 (spool_leak)",
+        ),
     )
 
     first: str
@@ -165,6 +169,7 @@ class ProportionalValve(Effect):
     discharge_asymmetry: Expression = strength(typical=0.15, lower=-0.5, upper=0.5, deviation=0.02)
     exhaust_restriction_share: Expression = strength(typical=0.5, upper=0.9)
     supply_restriction_share: Expression = strength(typical=0.5, upper=0.9)
+    leak_area_m2: Expression = strength(typical=5e-8, upper=1e-6)
 
     discharge_coefficient: Expression = form(0.6, lower=0.05, upper=1.2, relative_deviation=0.05)
     radius_m: Expression = form(1e-3, lower=1e-5, upper=1e-2)
@@ -209,3 +214,18 @@ class ProportionalValve(Effect):
         offset_v = now[self.name].command_v - self.centre_v
         yield from self.underlap(self, self.first, offset_v, now)
         yield from self.underlap(self, self.second, -offset_v, now)
+        for chamber in (self.first, self.second):
+            yield from self.through(chamber, self.leak_area_m2, self.leak_area_m2, now)
+
+    def through(
+        self, chamber: str, supplied_m2: Expression, vented_m2: Expression, now: Conditions
+    ) -> Iterator[MassFlow]:
+        """Flows through a hole to the supply and one to the exhaust."""
+        gas = now[chamber]
+        charge = path_between(now["supply"], gas, self.gas_constant_j_kg_k)
+        vent = path_between(gas, now["atmosphere"])
+        into_kg_s = gas.line_share * charge.flow_kg_s(supplied_m2, NozzleLaw())
+        out_kg_s = gas.line_share * vent.flow_kg_s(vented_m2, NozzleLaw())
+        yield MassFlow(chamber, into_kg_s, charge.temperature_k)
+        yield MassFlow("supply", -into_kg_s, charge.temperature_k)
+        yield MassFlow(chamber, -out_kg_s, vent.temperature_k)

@@ -149,10 +149,11 @@ class SolenoidValve(Effect):
         outlet_m2 = _seat_m2(self.exhaust_diameter_m, self.full_lift_m - lift_m)
         inlet_m2 *= (1.0 + self.discharge_asymmetry) * (1.0 - self.supply_restriction_share)
         outlet_m2 *= (1.0 - self.discharge_asymmetry) * (1.0 - self.exhaust_restriction_share)
-        into_kg_s = self._flow_kg_s(charge, inlet_m2)
+        into_kg_s = gas.line_share * self._flow_kg_s(charge, inlet_m2)
+        out_kg_s = gas.line_share * self._flow_kg_s(vent, outlet_m2)
         yield MassFlow(self.chamber, into_kg_s, charge.temperature_k)
         yield MassFlow("supply", -into_kg_s, charge.temperature_k)
-        yield MassFlow(self.chamber, -self._flow_kg_s(vent, outlet_m2), vent.temperature_k)
+        yield MassFlow(self.chamber, -out_kg_s, vent.temperature_k)
 
     def _flow_kg_s(self, path: Path, seat_m2: Expression) -> Expression:
         """Flow through a seat and through the leak beside it."""

@@ -42,6 +42,7 @@ def guessed_states(plant: Plant, recording: Recording) -> np.ndarray:
         speed = name.replace("position_m", "velocity_m_s").replace("angle_rad", "rate_rad_s")
         if speed != name and speed not in seen:
             seen[speed] = slope(seen[name], recording.sample_time_s, starts)
+    seen["time_s"] = recording.time_s
     blind = long_holes(plant, recording)
     rows = []
     for member in plant.members:

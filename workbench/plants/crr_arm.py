@@ -16,7 +16,6 @@ from math import radians
 
 from workbench.effect import Effect
 from workbench.effects import (
-    AngleSensorOffset,
     ClockDrift,
     EndStops,
     JointFriction,
@@ -25,6 +24,7 @@ from workbench.effects import (
     SensorDelay,
     SupplyDroop,
 )
+from workbench.effects.sensors import sensor_flaws
 from workbench.linkage import HeldJoint, Joint, JointRod, Link, TorqueSource
 from workbench.plant import Plant, Signal
 from workbench.plants.crr_cylinder import NETWORK_S, SUPPLY_PA, CrrCylinder, surroundings
@@ -78,7 +78,7 @@ def crr_arm() -> Plant:
             SensorDelay(name="sensor_delay", signals=OUTPUTS, delay_s=NETWORK_S),
             PacketPause(name="packet_pause", signals=NETWORK),
             ClockDrift(name="clock_drift", signals=NETWORK),
-            AngleSensorOffset(name="sensor_offset@joint.angle", signal=OUTPUTS[0]),
+            *sensor_flaws({OUTPUTS[0]: START_RAD}),
         ),
         commands=(CYLINDER.command,),
         optional_inputs=(Signal("supply.pressure_pa", nominal=SUPPLY_PA),),

@@ -25,15 +25,19 @@ from workbench.effects import (
     ConstantForce,
     DeadZone,
     EndCushion,
+    LineDelay,
     PistonLeak,
-    PressureSensorOffset,
     ProportionalValve,
     RodEnd,
     SpringForce,
+    StuckBand,
+    ThermalFriction,
+    ValveHysteresis,
     ValveLag,
     ValveOffset,
     WallHeat,
 )
+from workbench.effects.sensors import sensor_flaws
 from workbench.parts import Atmosphere, Chamber, Supply
 from workbench.plant import Signal
 
@@ -49,6 +53,8 @@ NOMINAL_CENTRE_V = 5.0
 FULL_V = 10.0 - OFFSET_V + NOMINAL_CENTRE_V  # behind the offset, where 10 V arrives
 CHARGING, DISCHARGING = 0.62, 0.55  # discharge coefficients
 MEAN_COEFFICIENT = (CHARGING + DISCHARGING) / 2
+COULOMB_N = 13.3
+STEEPNESS_S_M = 1580.0
 NETWORK_S = 1e-3  # each way
 
 
@@ -121,39 +127,45 @@ class CrrCylinder:
             *self._valve_effects(),
             WallHeat(name=at("wall_heat"), chambers=self.chambers),
             self._friction(),
+            ThermalFriction(
+                name=at("friction_thermal"),
+                body=self.rod,
+                rubbing_force_n=COULOMB_N,
+                steepness_s_m=STEEPNESS_S_M,
+            ),
             RodEnd(name=at("rod_end"), body=self.rod, area_m2=ROD_AREA_M2),
             *(ChamberLeak(name=f"chamber_leak@{c}", chamber=c) for c in self.chambers),
             PistonLeak(name=at("piston_leak"), first=cap, second=rod_side),
             ConstantForce(name=at("constant_force"), body=self.rod),
             SpringForce(name=at("spring_force"), body=self.rod, rest_m=self.stroke_m / 2),
             EndCushion(name=at("end_cushion"), body=self.rod, stroke_m=self.stroke_m),
-            *(
-                PressureSensorOffset(name=f"sensor_offset@{chamber}.pressure", signal=signal)
-                for chamber, signal in zip(self.chambers, self.pressures, strict=True)
-            ),
+            *sensor_flaws(dict.fromkeys(self.pressures, REST_PA)),
         )
 
     def _named(self, effect: str) -> str:
         """Name of an effect, with its place where there are several cylinders."""
         return f"{effect}@{self.rod}" if self.suffix else effect
 
+    def _on_valve(self, effect: str) -> str:
+        """The same for what sits at the valve."""
+        return f"{effect}@{self.valve}" if self.suffix else effect
+
     def _valve_effects(self) -> tuple[Effect, ...]:
-        signal, first_second = self.command.name, self.chambers
-        name = {
-            key: f"{key}@{self.valve}" if self.suffix else key
-            for key in ("command_delay", "valve_lag", "valve_offset", "valve_dead_zone")
-        }
+        command, play = {"signal": self.command.name}, {"span": 10.0, "initial": OFFSET_V}
+        first, second = self.chambers
+        at = self._on_valve
         return (
-            CommandDelay(name=name["command_delay"], signal=signal, delay_s=NETWORK_S),
-            ValveLag(name=name["valve_lag"], signal=signal, initial_v=OFFSET_V),
-            ValveOffset(
-                name=name["valve_offset"], signal=signal, offset_v=OFFSET_V - NOMINAL_CENTRE_V
-            ),
-            DeadZone(name=name["valve_dead_zone"], signal=signal, full_v=FULL_V),
+            CommandDelay(name=at("command_delay"), delay_s=NETWORK_S, **command),
+            LineDelay(name=at("line_delay"), chambers=self.chambers, **command),
+            ValveHysteresis(name=at("valve_hysteresis"), **play, **command),
+            ValveLag(name=at("valve_lag"), initial_v=OFFSET_V, **command),
+            ValveOffset(name=at("valve_offset"), offset_v=OFFSET_V - NOMINAL_CENTRE_V, **command),
+            DeadZone(name=at("valve_dead_zone"), full_v=FULL_V, **command),
+            StuckBand(name=at("valve_stuck_band"), neutral=NOMINAL_CENTRE_V, span=10.0, **command),
             ProportionalValve(
                 name=self.valve,
-                first=first_second[0],
-                second=first_second[1],
+                first=first,
+                second=second,
                 underlap_v=0.75,
                 area_shape_share=1.0,
                 discharge_coefficient=MEAN_COEFFICIENT,
@@ -167,9 +179,9 @@ class CrrCylinder:
             body=self.rod,
             chambers=self.chambers,
             stribeck_exponent=5,
-            coulomb_force_n=13.3,
+            coulomb_force_n=COULOMB_N,
             stiction_excess_n=6.7,
             viscous_n_s_m=87.56,
             stribeck_velocity_m_s=2.54e-3,
-            steepness_s_m=1580.0,
+            steepness_s_m=STEEPNESS_S_M,
         )

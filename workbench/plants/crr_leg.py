@@ -14,7 +14,6 @@ from __future__ import annotations
 from math import radians
 
 from workbench.effects import (
-    AngleSensorOffset,
     ClockDrift,
     JointFriction,
     LinkGravity,
@@ -22,6 +21,7 @@ from workbench.effects import (
     SensorDelay,
     SupplyDroop,
 )
+from workbench.effects.sensors import sensor_flaws
 from workbench.leg import Leg
 from workbench.linkage import Joint, JointRod
 from workbench.plant import Plant, Signal
@@ -90,10 +90,7 @@ def crr_leg() -> Plant:
             SensorDelay(name="sensor_delay", signals=OUTPUTS, delay_s=NETWORK_S),
             PacketPause(name="packet_pause", signals=NETWORK),
             ClockDrift(name="clock_drift", signals=NETWORK),
-            *(
-                AngleSensorOffset(name=f"sensor_offset@{joint}.angle", signal=signal)
-                for joint, signal in zip(JOINTS, ANGLES, strict=True)
-            ),
+            *sensor_flaws(dict(zip(ANGLES, START_RAD, strict=True))),
         ),
         commands=tuple(cylinder.command for cylinder in CYLINDERS),
         optional_inputs=(Signal("supply.pressure_pa", nominal=SUPPLY_PA),),

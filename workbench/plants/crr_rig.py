@@ -20,10 +20,10 @@ from workbench.effects import (
     ClockDrift,
     EndStops,
     PacketPause,
-    PositionSensorOffset,
     SensorDelay,
     SupplyDroop,
 )
+from workbench.effects.sensors import sensor_flaws
 from workbench.parts import Body
 from workbench.plant import Plant, Signal
 from workbench.plants.crr_cylinder import NETWORK_S, SUPPLY_PA, CrrCylinder, surroundings
@@ -50,7 +50,7 @@ def crr_rig() -> Plant:
             SensorDelay(name="sensor_delay", signals=OUTPUTS, delay_s=NETWORK_S),
             PacketPause(name="packet_pause", signals=NETWORK),
             ClockDrift(name="clock_drift", signals=NETWORK),
-            PositionSensorOffset(name="sensor_offset@rod.position", signal=OUTPUTS[0]),
+            *sensor_flaws({OUTPUTS[0]: CYLINDER.start_m}),
         ),
         commands=(CYLINDER.command,),
         optional_inputs=(Signal("supply.pressure_pa", nominal=SUPPLY_PA),),

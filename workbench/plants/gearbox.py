@@ -24,8 +24,10 @@ Source: paper 003, nonlinear model.  It prints no parameter: the layout and ever
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from math import pi
 
+from workbench.effect import Effect
 from workbench.effects import (
     ChamberLeak,
     CommandDelay,
@@ -35,10 +37,9 @@ from workbench.effects import (
     EndCushion,
     EndStops,
     LeverLink,
+    LineDelay,
     PistonContact,
     PistonLeak,
-    PositionSensorOffset,
-    PressureSensorOffset,
     SolenoidValve,
     SpringForce,
     StribeckFriction,
@@ -46,6 +47,7 @@ from workbench.effects import (
     Synchroniser,
     ThermalFriction,
 )
+from workbench.effects.sensors import sensor_flaws
 from workbench.floating_piston import ControlChamber, FloatingPiston, SharedChamber
 from workbench.lever import Lever, LeverLoad
 from workbench.parts import Atmosphere, Body, Chamber, Part, Supply
@@ -74,7 +76,7 @@ def gearbox(start_m: float = 0.0) -> Plant:
     return Plant(
         name="gearbox",
         parts=_parts(start_m),
-        effects=(*_valves(), *_mechanics(), *_gas(), *_sensors()),
+        effects=(*_valves(), *_mechanics(), *_gas(), *_sensors(start_m)),
         commands=tuple(Signal(name, 0.0, 0.0, 1.0, levels=(0.0, 1.0)) for name in COMMANDS),
         optional_inputs=(
             Signal("supply.pressure_pa", nominal=SUPPLY_PA),
@@ -122,16 +124,20 @@ def _parts(start_m: float) -> tuple[Part, ...]:
     )
 
 
-def _valves() -> tuple:
+def _valves() -> tuple[Effect, ...]:
     names = ("valve_1", "valve_2")
     return (
         *(CommandDelay(name=f"command_delay@{n}", signal=f"{n}.command") for n in names),
+        *(
+            LineDelay(name=f"line_delay@{n}", signal=f"{n}.command", chambers=(f"chamber_{n[-1]}",))
+            for n in names
+        ),
         *(SolenoidValve(name=n, chamber=f"chamber_{n[-1]}") for n in names),
         SupplyDroop(name="supply_droop"),
     )
 
 
-def _mechanics() -> tuple:
+def _mechanics() -> tuple[Effect, ...]:
     dry = dict(steepness_s_m=STEEPNESS_S_M)
     main = dict(body=MAIN, chambers=("chamber_1", "control_chamber"), **dry)
     ring = dict(body=FLOATING, chambers=("chamber_2", "control_chamber"), **dry)
@@ -157,7 +163,7 @@ def _mechanics() -> tuple:
     )
 
 
-def _gas() -> tuple:
+def _gas() -> tuple[Effect, ...]:
     chambers = ("chamber_1", "chamber_2", "control_chamber")
     return (
         ConstantWallHeat(name="wall_heat", chambers=chambers, coefficient_w_m2_k=40.0),
@@ -166,10 +172,6 @@ def _gas() -> tuple:
     )
 
 
-def _sensors() -> tuple:
-    first, second, position = OUTPUTS
-    return (
-        PressureSensorOffset(name="sensor_offset@chamber_1.pressure", signal=first),
-        PressureSensorOffset(name="sensor_offset@chamber_2.pressure", signal=second),
-        PositionSensorOffset(name="sensor_offset@main_piston.position", signal=position),
-    )
+def _sensors(start_m: float) -> Iterator[Effect]:
+    starts = (ATMOSPHERE_PA, ATMOSPHERE_PA, start_m)
+    return sensor_flaws(dict(zip(OUTPUTS, starts, strict=True)))

@@ -14,8 +14,6 @@ Values are from the paper's list of constants and Tables 3 to 6, except where ma
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 from workbench.effect import Effect
 from workbench.effects import (
     BristleFriction,
@@ -28,21 +26,18 @@ from workbench.effects import (
     FivePortValve,
     LineDelay,
     PistonLeak,
-    PositionSensorOffset,
-    PressureSensorOffset,
-    SensorLag,
-    SensorScale,
     SpringForce,
     StuckBand,
     SupplyDroop,
+    ThermalFriction,
     ValveHysteresis,
     ValveLag,
     ValveOffset,
     WallHeat,
 )
+from workbench.effects.sensors import sensor_flaws
 from workbench.parts import Atmosphere, Body, Chamber, Supply
 from workbench.plant import Plant, Signal
-from workbench.units import public_name
 
 GAS_CONSTANT_J_KG_K = 288.0
 STROKE_M = 0.290
@@ -56,6 +51,7 @@ CENTRE_V = 4.95  # (zms + zmd) / 2
 HALF_WIDTH_V = 0.42  # (zmd - zms) / 2
 BRISTLE_STIFFNESS_N_M = 1.12e6
 BRISTLE_DAMPING_N_S_M = 50.0
+RUBBING_N = 27.3  # Coulomb friction, both directions
 FLOW_AREA_M2 = 2.8274e-5
 LEAK_AREA_M2 = 8e-8
 START_M = STROKE_M / 2
@@ -105,17 +101,6 @@ def _command_path() -> tuple[Effect, ...]:
     )
 
 
-def _sensors() -> Iterator[Effect]:
-    """What may be wrong with the three sensors, each cause at each of them."""
-    starts = (START_M, REST_PA, REST_PA)
-    for signal, unit, start in zip(OUTPUTS, (0.1, 1e5, 1e5), starts, strict=True):
-        place = public_name(signal)
-        yield SensorLag(name=f"sensor_lag@{place}", signal=signal, unit=unit, initial=start)
-        yield SensorScale(name=f"sensor_scale@{place}", signal=signal)
-        offset = PositionSensorOffset if signal == OUTPUTS[0] else PressureSensorOffset
-        yield offset(name=f"sensor_offset@{place}", signal=signal)
-
-
 def servo_drive() -> Plant:
     """The drive as identified in the paper; what it may lack stands at null."""
     chamber = dict(
@@ -150,6 +135,7 @@ def servo_drive() -> Plant:
             ),
             WallHeat(name="wall_heat", chambers=(a, b), coefficient_w_m2_k=22.563),
             _friction(),
+            ThermalFriction(name="friction_thermal", body="slide", rubbing_force_n=RUBBING_N),
             EndStops(name="stops", body="slide", stiffness_n_m=2e6, upper_m=STROKE_M),
             ChamberLeak(name="chamber_leak@chamber_a", chamber=a),
             ChamberLeak(name="chamber_leak@chamber_b", chamber=b),
@@ -158,7 +144,7 @@ def servo_drive() -> Plant:
             ConstantForce(name="constant_force", body="slide"),
             SpringForce(name="spring_force", body="slide", rest_m=STROKE_M / 2),
             EndCushion(name="end_cushion", body="slide", stroke_m=STROKE_M),
-            *_sensors(),
+            *sensor_flaws(dict(zip(OUTPUTS, (START_M, REST_PA, REST_PA), strict=True))),
         ),
         commands=(Signal(COMMAND, nominal=CENTRE_V, lower=0.0, upper=RANGE_V),),
         optional_inputs=(Signal("supply.pressure_pa", nominal=SUPPLY_PA),),

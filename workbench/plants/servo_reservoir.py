@@ -17,15 +17,13 @@ from workbench.effects import (
     FivePortValve,
     HeatedWall,
     LineDelay,
-    PressureSensorOffset,
-    SensorLag,
-    SensorScale,
     StuckBand,
     SupplyDroop,
     ValveHysteresis,
     ValveLag,
     ValveOffset,
 )
+from workbench.effects.sensors import sensor_flaws
 from workbench.parts import Atmosphere, Supply
 from workbench.plant import Plant, Signal
 from workbench.plants.servo_drive import (
@@ -88,14 +86,7 @@ def servo_reservoir() -> Plant:
             HeatedWall(name="wall_heat", chambers=("reservoir",), coefficient_w_m2_k=17.275),
             ChamberLeak(name="chamber_leak", chamber="reservoir"),
             SupplyDroop(name="supply_droop"),
-            SensorLag(
-                name="sensor_lag@reservoir.pressure",
-                signal=PRESSURE,
-                unit=1e5,
-                initial=ATMOSPHERE_PA,
-            ),
-            SensorScale(name="sensor_scale@reservoir.pressure", signal=PRESSURE),
-            PressureSensorOffset(name="sensor_offset@reservoir.pressure", signal=PRESSURE),
+            *sensor_flaws({PRESSURE: ATMOSPHERE_PA}),
         ),
         commands=(Signal(COMMAND, nominal=CENTRE_V, lower=0.0, upper=RANGE_V),),
         optional_inputs=(Signal("supply.pressure_pa", nominal=SUPPLY_PA),),

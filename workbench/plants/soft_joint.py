@@ -22,14 +22,12 @@ from workbench.effects import (
     ChamberLeak,
     CommandDelay,
     LineDelay,
-    PressureSensorOffset,
     PwmLag,
-    SensorLag,
-    SensorScale,
     SupplyDroop,
     ThreePortValve,
     ValveHysteresis,
 )
+from workbench.effects.sensors import sensor_flaws
 from workbench.gas_volume import ConstantTemperatureLevel
 from workbench.parts import Atmosphere, Supply
 from workbench.plant import Plant, Signal
@@ -70,11 +68,7 @@ def soft_joint() -> Plant:
             BellowsCreep(name="bellows_creep", chamber="bellows"),
             ChamberLeak(name="chamber_leak", chamber="bellows"),
             SupplyDroop(name="supply_droop"),
-            SensorLag(
-                name="sensor_lag@bellows.pressure", signal=PRESSURE, unit=1e5, initial=ATMOSPHERE_PA
-            ),
-            SensorScale(name="sensor_scale@bellows.pressure", signal=PRESSURE),
-            PressureSensorOffset(name="sensor_offset@bellows.pressure", signal=PRESSURE),
+            *sensor_flaws({PRESSURE: ATMOSPHERE_PA}),
         ),
         commands=(Signal(COMMAND, nominal=NEUTRAL, lower=0.0, upper=1.0),),
         optional_inputs=(Signal("supply.pressure_pa", nominal=SUPPLY_PA),),

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from workbench.errors import InputError, Message, listed
+from workbench.fitting.unknowns import nominal_unknowns
 from workbench.plant import Plant
 from workbench.reading.table import RecordingWarning
 from workbench.recording import Recording
@@ -109,13 +110,11 @@ def enough_samples(rig: Rig, recordings: Sequence[Recording], only: Sequence[str
     InputError
         Naming the recordings, with both numbers.
     """
-    free = only or [
-        name
-        for name in rig.plant.values
-        if rig.standard_deviation(name) > 0.0 and name not in rig.fixed
-    ]
+    plant = rig.plant
+    added = [c for name, c in plant.candidates.items() if name in rig.added]
+    free = only or nominal_unknowns(plant, rig.deviations, rig.fixed, added).names
     samples = sum(map(len, recordings))
     if samples < len(free):
-        what = f"{samples} samples are fewer than the {len(free)} parameters of {rig.plant.name}"
+        what = f"{samples} samples are fewer than the {len(free)} parameters of {plant.name}"
         sources = listed(each.source or each.name for each in recordings)
         raise InputError(Message(what, expected="a longer recording to fit", file=sources))
