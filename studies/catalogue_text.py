@@ -82,6 +82,8 @@ def candidate_name(plant: Plant, effect: str, at: str | None) -> str:
     places = [full for full in plant.candidates if full.partition("@")[0] == effect]
     if len(places) == 1 and at is None:
         return places[0]
+    if places == [effect]:
+        raise InputError(Message("has one place only", effect, "no --at"))
     if places:
         raise InputError(Message("needs its place", effect, f"--at, for one of {listed(places)}"))
     known = f"one that `workbench effects {plant.name}` lists"

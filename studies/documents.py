@@ -55,13 +55,13 @@ def comparison_document(found: Comparison) -> Document:
 
 def diagnosis_document(found: Diagnosis, unit_of: Mapping[str, str]) -> Document:
     """A diagnosis, with the keys of interface.md section 4."""
-    best = found.best
+    named, best = found.named, found.best
     return {
         "schema": "workbench.diagnosis/1",
         "rig": found.rig_name,
         "verdict": found.verdict.value,
-        "effect": best.candidate.cause.name if best else None,
-        "at": best.candidate.place if best else None,
+        "effect": named.candidate.cause.name if named else None,
+        "at": named.candidate.place if named else None,
         "sentence": found.sentence,
         "ranking": [_ranked(row) for row in found.ranking],
         "where": _where(found.where) if found.where else None,

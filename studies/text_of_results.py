@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from workbench.comparison.compare import Comparison, RecordingComparison
     from workbench.diagnosis.improve import Addition, Improvement
-    from workbench.diagnosis.result import Diagnosis, Ranked
+    from workbench.diagnosis.result import Diagnosis, Law, Ranked
     from workbench.fitting.errors import SignalError
     from workbench.fitting.fit import FitReport
 
@@ -66,6 +66,8 @@ def diagnosis_text(found: Diagnosis, unit_of: Mapping[str, str]) -> str:
     parts = [f"verdict: {found.verdict.value}: {found.sentence}"]
     parts += [f"warning: {warning}" for warning in found.warnings]
     parts += ["", ranking_text(found)]
+    if found.law:
+        parts += ["", law_text(found.law)]
     if found.where:
         parts += ["", where_text(found)]
     if found.after and unit_of:
@@ -91,6 +93,18 @@ def ranking_text(found: Diagnosis) -> str:
     rest = len(found.ranking) - SHOWN_RANKS
     more = f"\n... and {rest} more, in the JSON" if rest > 0 else ""
     return columns(head, rows) + more
+
+
+def law_text(law: Law) -> str:
+    """What an empirical law explains, and where it was seen."""
+    ranges = (
+        f"{public_name(name)} {shown(low, name, 3)} to {shown(high, name, 3)}"
+        for name, (low, high) in law.ranges.items()
+    )
+    return (
+        f"law: drop train {percent(law.drop_train, 1)}, "
+        f"validation {percent(law.drop_validation, 1)}; seen for {', '.join(ranges)}"
+    )
 
 
 def sizes_text(row: Ranked) -> str:
@@ -145,6 +159,12 @@ def before_after_text(before: Errors, after: Errors, unit_of: Mapping[str, str])
     return columns(("set", "signal", "RMSE before", "after", "fit % before", "after"), rows)
 
 
+def spread(value: float, deviation: float, name: str) -> str:
+    """A quantity with its standard deviation, where it has one."""
+    known = f" ± {shown(deviation, name, 2)}" if isfinite(deviation) else ""
+    return shown(value, name) + known
+
+
 def unit_names(outputs: tuple[str, ...]) -> dict[str, str]:
     """Full name of each output by its public name."""
     return {public_name(name): name for name in outputs} | {name: name for name in outputs}
@@ -158,8 +178,8 @@ def addition_text(found: Addition, unit_of: Mapping[str, str]) -> str:
     rows = [
         (
             public_name(row.name),
-            f"{shown(row.before, row.name)} ± {shown(row.prior_deviation, row.name, 2)}",
-            f"{shown(row.after, row.name)} ± {shown(row.deviation, row.name, 2)}",
+            spread(row.before, row.prior_deviation, row.name),
+            spread(row.after, row.deviation, row.name),
         )
         for row in found.parameters
     ]
@@ -185,8 +205,8 @@ def fit_text(found: FitReport, unit_of: Mapping[str, str]) -> str:
     rows = [
         (
             public_name(row.name),
-            f"{shown(row.prior, row.name)} ± {shown(row.prior_deviation, row.name, 2)}",
-            f"{shown(row.value, row.name)} ± {shown(row.deviation, row.name, 2)}",
+            spread(row.prior, row.prior_deviation, row.name),
+            spread(row.value, row.deviation, row.name),
             ", ".join(
                 word for word, holds in (("at a bound", row.at_bound), ("flat", row.flat)) if holds
             ),

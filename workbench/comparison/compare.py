@@ -142,7 +142,8 @@ def _noise(recording: Recording, outputs: tuple[str, ...]) -> dict[str, float]:
         try:
             found |= measured_noise([recording], [name])
         except ValueError:
-            found[name] = max(1e-3 * float(np.ptp(recording[name])), 1e-12)
+            span = float(np.nanmax(recording[name]) - np.nanmin(recording[name]))
+            found[name] = max(1e-3 * span, 1e-12)
     return found
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from workbench.effects.forces import EndStops
 from workbench.fitting.gauss_newton import Fit
-from workbench.fitting.starts import guessed_states, slope
+from workbench.fitting.starts import bridged, guessed_states, slope
 from workbench.plant import Plant
 from workbench.recording import Recording
 from workbench.simulation import inputs
@@ -105,7 +105,7 @@ def _position(plant: Plant, recording: Recording) -> str | None:
 
 
 def _motion(plant: Plant, recording: Recording, place: str) -> dict[str, np.ndarray]:
-    position_m = recording[place]
+    position_m = bridged(recording[place], recording.starts)
     velocity_m_s = slope(position_m, recording.sample_time_s, recording.starts)
     moving = np.where(np.abs(velocity_m_s) < RESTING_M_S, 0.0, np.sign(velocity_m_s))
     low_m, high_m = _stroke(plant, position_m)

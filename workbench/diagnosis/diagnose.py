@@ -20,15 +20,16 @@ from workbench.diagnosis.judge import (
     reasons_against,
 )
 from workbench.diagnosis.law import empirical_law
-from workbench.diagnosis.ranking import predicts_row, ranked
+from workbench.diagnosis.ranking import ranked
 from workbench.diagnosis.refit import Refit, refit, refit_shift
-from workbench.diagnosis.result import Diagnosis, Law, Ranked, Verdict
+from workbench.diagnosis.result import NAMING, Diagnosis, Law, Ranked, Verdict
 from workbench.diagnosis.rough import rough_fit
 from workbench.diagnosis.scan import Profile, scan
 from workbench.diagnosis.shifts import Shift, shifts
 from workbench.diagnosis.where import locate
 from workbench.effect import Kind
 from workbench.fitting.errors import errors_of
+from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.problem import Problem, improved_base, pose, split
 from workbench.fitting.windows import MOST_WINDOWS
 from workbench.recording import Recording
@@ -41,6 +42,8 @@ WORTH_A_REFIT = 0.4  # of the best share of the first fits
 SHIFTS_REFITTED = 2  # parameters that leave their priors
 WORTH_A_SHIFT = 0.25  # of the best refit
 CERTAIN_SHARE = 0.5  # an accepted candidate above it needs no comparison with an empirical law
+
+FAR_ABOVE_NOISE = 3.0  # RMSE over noise that is worth a word where nothing is named
 
 WEAK_EVIDENCE = "no validation recording: the last third is held out, which is weak evidence"
 
@@ -84,14 +87,16 @@ def diagnose(
         problem = better
         found = _followed(problem, progress)
     profiles, refits, moved = found.profiles, found.refits, found.moved
-    ranking = ranked(problem, profiles, refits, moved)
+    ranking = ranked(problem, profiles, refits, moved, found.begun)
     progress("where it fails")
     where = locate(problem, train)
     law = _law(problem, ranking, profiles, progress)
     verdict = _verdict(ranking, law, held_out)
-    best = next((r for r in refits if ranking and r.candidate == ranking[0].candidate), None)
-    if best and not best.fit.converged:
+    best = ranking[0] if verdict in NAMING else None
+    if best and best.fit and not best.fit.converged:
         warnings += (f"the refit with {best.candidate.name} did not converge: its size may be off",)
+    after = (law.fit, law.validation) if law else (best and best.fit, best and best.validation)
+    warnings += _unexplained(after[1] or problem.base_validation, verdict)
     return Diagnosis(
         rig_name=rig.name,
         verdict=verdict,
@@ -99,8 +104,8 @@ def diagnose(
         ranking=ranking,
         where=where,
         before=errors_of(problem.base, problem.base_validation),
-        after=errors_of(best.fit, best.validation) if best else {},
-        law=law if verdict is Verdict.NOT_IN_CATALOGUE else None,
+        after=errors_of(*after) if after[0] else {},
+        law=law,
         warnings=warnings,
         base=problem.base,
         base_validation=problem.base_validation,
@@ -109,9 +114,10 @@ def diagnose(
 
 @dataclass(frozen=True)
 class _Followed:
-    """Scan, refits (best first), and shifts of fitted parameters."""
+    """Scan, shares that first fits removed, refits (best first), shifts of fitted parameters."""
 
     profiles: list[Profile]
+    begun: dict[str, float]
     refits: list[Refit]
     moved: list[Shift]
 
@@ -136,8 +142,10 @@ def _followed(problem: Problem, progress: Progress) -> _Followed:
     for shift in [each for each in moved if each.leaves and each.drop > least][:SHIFTS_REFITTED]:
         progress(f"refit with {shift.name} free")
         refits.append(refit_shift(problem, shift, _best_share(refits)))
-    refits.sort(key=lambda each: (not predicts(each), -each.drop_train))
-    return _Followed(profiles, refits, moved)
+    against = {id(each): reasons_against(problem.base, each) for each in refits}
+    refits.sort(key=lambda r: (bool(against[id(r)]), not predicts(r), -r.drop_train))
+    shares = {each.profile.candidate.name: each.share for each in begun}
+    return _Followed(profiles, shares, refits, moved)
 
 
 def _best_share(refits: list[Refit]) -> float:
@@ -167,7 +175,8 @@ def _law(
     """An empirical law, unless an effect of the catalogue explains most of the misfit already.
 
     A parameter that leaves its prior is no such effect: it may well imitate the law.  So the law
-    is to leave a fifth less than the best effect, and only less than the best shift.
+    is to leave a fifth less than the best effect, and only less than the best shift; what fails
+    another criterion than its share is no rival.
     """
     leader = ranking[0] if ranking else None
     certain = leader and leader.accepted and leader.kind is Kind.EFFECT
@@ -176,7 +185,7 @@ def _law(
     progress("empirical law")
     led_by = (p.drop for p in profiles if certain and p.candidate == leader.candidate)
     law = empirical_law(problem, max(led_by, default=0.0))
-    followed = [r for r in ranking if r.fit is not None and predicts_row(r)]
+    followed = [r for r in ranking if r.accepted or r.reasons == (SHARE_REASON,)]
     effect, shift = (
         max((r.drop_train for r in followed if r.kind is kind), default=0.0)
         for kind in (Kind.EFFECT, Kind.PARAMETER)
@@ -195,6 +204,18 @@ def _verdict(ranking: tuple[Ranked, ...], law: Law | None, held_out: bool) -> Ve
     if leader and leader.reasons == (SHARE_REASON,):
         return Verdict.SMALL_PROXY
     return Verdict.NOTHING_MISSING
+
+
+def _unexplained(held_out: Fit | None, verdict: Verdict) -> tuple[str, ...]:
+    """A warning where nothing is named and the error stays far above the noise all the same."""
+    if held_out is None or verdict in NAMING or verdict is Verdict.NOT_IN_CATALOGUE:
+        return ()
+    far = [
+        f"{name} {error.rmse / error.noise:.0f} times its noise"
+        for name, error in errors_of(held_out, None)["train"].items()
+        if error.rmse > FAR_ABOVE_NOISE * error.noise
+    ]
+    return (f"unexplained errors remain on held-out windows: {', '.join(far)}",) if far else ()
 
 
 def _sentence(verdict: Verdict, ranking: tuple[Ranked, ...], law: Law | None) -> str:

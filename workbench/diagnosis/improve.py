@@ -83,7 +83,8 @@ def add(
     KeyError
         If the plant has no such effect for these recordings, with the nearest name.
     ValueError
-        If the effect is there already, or only a shift of a parameter that is fitted anyway.
+        If the effect is there already, only a shift of a parameter that is fitted anyway, fixed by
+        the rig, or a change of something that the plant lacks.
     """
     plant = rig.fit_for(train[0])
     require([name], plant.candidates, plant.name)
@@ -95,6 +96,10 @@ def add(
     problem = pose(rig, train, validation)
     if candidate in problem.added or _present(problem, candidate):
         raise ValueError(f"{name}: {rig.name} has it already; fit moves it")
+    if not plant.ready_for(candidate):
+        raise ValueError(f"{name}: nothing without {candidate.member}.{candidate.cause.needs}")
+    if candidate.strength in rig.fixed:
+        raise ValueError(f"{name}: {rig.name} fixes {candidate.strength}: nothing to fit")
     progress(f"refit with {name}")
     base = problem.base
     profiles = scan(problem.whole, base.windows, base.unknowns, base.point, [candidate])
@@ -141,7 +146,8 @@ def improve(
             break
         progress(f"accepted {best.candidate.name}")
         steps.append(accept(current, diagnosis))
-        current = _freed(current, best.candidate, best.fit)
+        freed = _freed(current, best.candidate, best.fit)
+        current = replace(freed, notes=steps[-1].rig.notes)
     final = steps[-1].rig if steps else rig
     budget = _budget(diagnoses, steps)
     return Improvement(final, tuple(steps), tuple(diagnoses), budget, stopped)

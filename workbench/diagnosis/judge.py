@@ -40,10 +40,14 @@ HELD_OUT_REASON = "does not predict the held-out recording better"
 SHARE_REASON = f"explains less than {LEAST_SHARE:.0%} of the misfit"
 
 
-def reasons_against(base: Fit, refit: Refit) -> tuple[str, ...]:
-    """The criteria that a refit fails, in words; empty where it is accepted."""
+def reasons_against(base: Fit, refit: Refit, parameters: int = 0) -> tuple[str, ...]:
+    """The criteria that a refit fails, in words; empty where it is accepted.
+
+    ``parameters`` is how many more it has than the base: by default those of its candidate.
+    """
     against = []
-    if _bic_gain(base, refit.fit, 1 + len(refit.candidate.forms)) <= LEAST_BIC:
+    count = parameters or 1 + len(refit.candidate.forms)
+    if _bic_gain(base, refit.fit, count) <= LEAST_BIC:
         against.append("gains less than its parameters cost")
     if not predicts(refit):
         against.append(HELD_OUT_REASON)
@@ -64,8 +68,7 @@ def _share(refit: Refit) -> float:
     """Share of the misfit that goes away, mean of training and held-out."""
     if isnan(refit.drop_validation):
         return refit.drop_train
-    unseen = max(refit.drop_validation, 1.0 - refit.plain_validation)
-    return (refit.drop_train + unseen) / 2
+    return (refit.drop_train + refit.drop_validation) / 2
 
 
 def _bic_gain(base: Fit, fit: Fit, parameters: int) -> float:
@@ -83,7 +86,8 @@ def _effective_samples(fit: Fit) -> float:
 
 def _size_reasons(refit: Refit) -> list[str]:
     """Size criteria: not negligible, not at a bound."""
-    name = refit.candidate.strength
+    candidate = refit.candidate
+    name = candidate.strength if candidate.strength in refit.size else candidate.held
     if name not in refit.size:
         return []
     known = refit.fit.plant.parameters[name]
@@ -117,6 +121,7 @@ def tie_group(base: Fit, refits: list[Refit], profiles: dict[str, Profile]) -> l
         cosine = abs(_alignment_of(best, other, profiles))
         if gap < CLOSE_DROP or (cosine > SAME_DIRECTION and gap < CLOSE_DROP_SAME):
             tied.append(other)
+    tied.sort(key=lambda each: bool(reasons_against(base, each)))
     tied = tied[:LARGEST_TIE]
     sound = [each for each in tied if not reasons_against(base, each)] or tied
     effects = [each for each in sound if each.candidate.name in profiles] or sound

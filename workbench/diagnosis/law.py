@@ -29,7 +29,7 @@ LEAST_TERM_SHARE = 0.10  # of the misfit that another term must take
 
 
 def empirical_law(problem: Problem, to_beat: float = 0.0) -> Law | None:
-    """The law of the balance that gains most and passes every criterion; None where none does.
+    """The law of up to three terms that passes every criterion; None where none does.
 
     None, too, where the scan of its first term promises less than ``to_beat``, which the scan of
     an effect promised.
@@ -43,7 +43,7 @@ def empirical_law(problem: Problem, to_beat: float = 0.0) -> Law | None:
         if not found or found.drop_train * misfit(problem.base) < LEAST_TERM_SHARE * first.misfit:
             break
         counted = _counted_from(first, found)
-        if reasons_against(first.base, counted):
+        if reasons_against(first.base, counted, parameters=len(accepted) + 1):
             break
         best = counted
         accepted.append(found.candidate)
@@ -95,19 +95,18 @@ def _next_term(problem: Problem, accepted: list[Candidate], to_beat: float) -> R
         if c.cause.name.startswith("law[") and c not in accepted
     ]
     profiles = scan(problem.whole, at.windows, at.unknowns, at.point, left, at.derivatives)
-    return (
-        refit(problem, rough_fit(problem, profiles[0]))
-        if profiles and profiles[0].drop > 0
-        else None
-    )
+    if not profiles or profiles[0].drop <= to_beat:
+        return None
+    return refit(problem, rough_fit(problem, profiles[0]))
 
 
 def _counted_from(first: Problem, found: Refit) -> Refit:
-    """The same refit with its drops counted from the problem before any term."""
+    """The same refit with its drop in training counted from the problem before any term.
+
+    Its validation is counted from there already: the held-out base stays that of the problem.
+    """
     train = (first.base.cost - found.fit.cost) / misfit(first.base)
-    before, after = first.base_validation, found.validation
-    held_out = (before.cost - after.cost) / misfit(before) if before and after else float("nan")
-    return replace(found, drop_train=train, drop_validation=held_out)
+    return replace(found, drop_train=train)
 
 
 def _law(problem: Problem, best: Refit, accepted: list[Candidate]) -> Law:
@@ -123,4 +122,5 @@ def _law(problem: Problem, best: Refit, accepted: list[Candidate]) -> Law:
         for name, rows in zip(windows.plant.measured, windows.measured, strict=True)
     }
     balance = f"{accepted[0].place}.{accepted[0].cause.balance.value}"
-    return Law(balance, terms, ranges, best.drop_train, best.drop_validation, text)
+    drops = (best.drop_train, best.drop_validation)
+    return Law(balance, terms, ranges, *drops, text, best.fit, best.validation)

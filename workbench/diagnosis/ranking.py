@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from workbench.diagnosis.judge import HELD_OUT_REASON, reasons_against, tie_group
 from workbench.diagnosis.refit import Refit
 from workbench.diagnosis.result import DecidedBy, Ranked
@@ -13,12 +15,16 @@ from workbench.plant import Candidate
 
 
 def ranked(
-    problem: Problem, profiles: list[Profile], refits: list[Refit], moved: list[Shift]
+    problem: Problem,
+    profiles: list[Profile],
+    refits: list[Refit],
+    moved: list[Shift],
+    begun: Mapping[str, float],
 ) -> tuple[Ranked, ...]:
     """All candidates, best first.
 
     Refits, among them shifts of parameters, come first, then the refits that the held-out
-    recording refuses, then the rest by the scan.
+    recording refuses, then the rest by the scan.  ``begun`` are the shares that first fits removed.
     """
     by_name = {profile.candidate.name: profile for profile in profiles}
     group = tie_group(problem.base, refits, by_name) if refits else []
@@ -29,7 +35,7 @@ def ranked(
     followed = [rows[name] for name in order if predicts_row(rows[name])]
     refused = [rows[name] for name in order if not predicts_row(rows[name])]
     rest = [_shifted(shift) for shift in moved if shift.candidate.name not in rows]
-    rest += [_scanned_row(problem, p) for p in profiles if p.candidate.name not in rows]
+    rest += [_scanned_row(problem, p, begun) for p in profiles if p.candidate.name not in rows]
     rest.sort(key=lambda row: -row.drop_train)
     asked = (*followed, *refused, *rest)
     return (*asked, *_not_asked(problem, {row.candidate.name for row in asked}))
@@ -110,7 +116,13 @@ def _shifted(shift: Shift) -> Ranked:
     )
 
 
-def _scanned_row(problem: Problem, profile: Profile) -> Ranked:
+def _scanned_row(problem: Problem, profile: Profile, begun: Mapping[str, float]) -> Ranked:
+    name = profile.candidate.name
+    reason = "not among the best of the scan"
+    if name in begun:
+        reason = f"left behind after a first fit, which removed {max(begun[name], 0.0):.0%}"
+    elif profile.drop <= 0.0:
+        reason = "brings nothing"
     return Ranked(
         candidate=profile.candidate,
         kind=Kind.EFFECT,
@@ -121,5 +133,5 @@ def _scanned_row(problem: Problem, profile: Profile) -> Ranked:
         compensable=profile.compensation,
         decided_by=DecidedBy.SCAN,
         accepted=False,
-        reasons=("not among the best of the scan",),
+        reasons=(reason,),
     )

@@ -24,6 +24,9 @@ class Verdict(Enum):
     NOT_IN_CATALOGUE = "not_in_catalogue"
 
 
+NAMING = (Verdict.FOUND, Verdict.TIE, Verdict.SMALL_PROXY)
+
+
 class DecidedBy(Enum):
     """How far a candidate was followed."""
 
@@ -122,8 +125,9 @@ class Where:
 class Law:
     """An empirical law for a balance that no effect of the catalogue explains.
 
-    ``terms`` are coefficients in SI by feature, for example ``{"v|v|": -240.0}``; ``ranges`` the
-    range of each driving variable it was seen in.  It is not a physical effect.
+    ``terms`` are coefficients in SI by full parameter name; ``ranges`` the range of each measured
+    output in which it was seen; ``fit`` and ``validation`` as of a refit.  It is not a physical
+    effect.
     """
 
     balance: str
@@ -132,6 +136,8 @@ class Law:
     drop_train: float
     drop_validation: float
     text: str
+    fit: Fit | None = field(default=None, repr=False)
+    validation: Fit | None = field(default=None, repr=False)
 
 
 @dataclass(frozen=True)
@@ -139,6 +145,7 @@ class Diagnosis:
     """One round of diagnosis; see interface.md section 4 for its JSON.
 
     ``before`` and ``after`` map ``train`` and ``validation`` to errors by public output name.
+    ``after`` belongs to what the verdict names, an effect or a law, and is empty without.
     ``base`` is the prior fit without any addition, ``base_validation`` the same on held-out data.
     """
 
@@ -155,7 +162,11 @@ class Diagnosis:
     base_validation: Fit | None = field(repr=False)
 
     @property
+    def named(self) -> Ranked | None:
+        """The first row of the ranking where the verdict speaks of it."""
+        return self.ranking[0] if self.ranking and self.verdict in NAMING else None
+
+    @property
     def best(self) -> Ranked | None:
-        """The first row of the ranking where the verdict names one."""
-        named = (Verdict.FOUND, Verdict.TIE)
-        return self.ranking[0] if self.ranking and self.verdict in named else None
+        """The first row of the ranking where it passes every criterion and the verdict names it."""
+        return self.named if self.verdict is not Verdict.SMALL_PROXY else None

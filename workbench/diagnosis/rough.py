@@ -69,7 +69,7 @@ def _with_shape(problem: Problem, unknowns: Unknowns, profile: Profile) -> Unkno
 
 
 def _distinct(trials: tuple[Trial, ...]) -> list[Trial]:
-    """The best trials, and among them both signs and shapes where the scan had them."""
+    """The best trial, and the next one where the scan found it nearly as good."""
     chosen = [trials[0]]
     for trial in trials[1:]:
         if len(chosen) < STARTS and trial.drop > 0.3 * trials[0].drop:

@@ -41,7 +41,7 @@ class Shift:
 
 
 def shifts(problem: Problem) -> list[Shift]:
-    """The shift of every cause whose parameter the base fit may move."""
+    """The shift of every cause whose parameter the base fit may move, largest drop first."""
     base = problem.base
     unknowns, t = base.unknowns, base.point.t
     normal = normal_equations(problem.linearised, unknowns)
@@ -52,6 +52,8 @@ def shifts(problem: Problem) -> list[Shift]:
         if name not in unknowns.names or candidate in problem.added or candidate.cause.tolerated:
             continue
         k = unknowns.names.index(name)
+        if normal.precision[k] == 0.0:  # pinned at a bound: freeing its prior moves nothing
+            continue
         alone = t[k] / (1.0 - variance[k])
         gained = t[k] ** 2 * variance[k] / (1.0 - variance[k])
         drop = gained / problem.misfit

@@ -136,7 +136,9 @@ def _dependences(
     n = len(term)
     drivers = dict(zip(result.state_names, result.states, strict=True))
     for name in plant.model.commands:
-        command = recording[name][: n * decimate : decimate]
+        used = (max(len(piece) // decimate, 1) * decimate for piece in recording.pieces)
+        pairs = zip(recording.pieces, used, strict=True)
+        command = np.concatenate([piece[name][:last:decimate] for piece, last in pairs])
         drivers[name] = command
         drivers[f"rate of {name}"] = np.gradient(command, result.time_s)
     found = [_dependence(name, values[:n], term[: len(values)]) for name, values in drivers.items()]

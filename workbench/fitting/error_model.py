@@ -52,13 +52,14 @@ def error_model(
     size = np.sqrt(squares / recorded)
     correlated = error.sum(axis=2) ** 2 / np.maximum(squares, 1e-300)
     correlated = np.clip(correlated, 1.0, error.shape[2])
-    moves = activity > ACTIVE * noise
-    quiet = np.maximum(_median_where(~moves, size), noise)
+    seen, moving = (weight > 0).any(axis=2), activity > ACTIVE * noise
+    rests, moves = seen & ~moving, seen & moving
+    quiet = np.maximum(_median_where(rests, size), noise)
     beyond = np.sqrt(np.maximum(size**2 - quiet**2, 0.0))
     return ErrorModel(
         quiet,
         _median_where(moves, beyond / np.maximum(activity, noise)),
-        np.maximum(_median_where(~moves, correlated), 1.0),
+        np.maximum(_median_where(rests, correlated), 1.0),
         np.maximum(_median_where(moves, correlated), 1.0),
     )
 

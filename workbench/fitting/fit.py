@@ -12,7 +12,8 @@ from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.posterior import fitted_rig, posterior_covariance
 from workbench.fitting.problem import Problem, pose
 from workbench.fitting.start_states import refit_starts
-from workbench.plant import require
+from workbench.fitting.unknowns import nominal_unknowns
+from workbench.plant import Candidate, Plant, require
 from workbench.recording import Recording
 from workbench.rig import Rig
 
@@ -26,6 +27,9 @@ class FittedParameter:
 
     flat        the recording left its prior as it was
     at_bound    the fit pushed it to the end of its range
+
+    An added cause has no prior: its deviation is infinite there.  One that the fit holds at a bound
+    has no deviation after it, NaN.
     """
 
     name: str
@@ -66,6 +70,8 @@ def fit(
     ------
     KeyError
         If ``only`` names what the plant does not have, with the nearest name.
+    ValueError
+        If ``only`` names nothing that is uncertain, or nothing at all is.
     """
     plant = rig.fit_for(train[0])
     require(only, plant.values, plant.name)
@@ -74,6 +80,10 @@ def fit(
         held = replace(rig, fixed=rig.fixed | others)
     else:
         held = rig
+    free = nominal_unknowns(plant, held.deviations, held.fixed, _added(held, plant)).names
+    if not free:
+        names = ", ".join(only) or "the plant"
+        raise ValueError(f"nothing to fit: {names} is fixed or has no uncertainty in {rig.name}")
     progress("fit")
     problem = pose(held, train, validation)
     before = _untouched(problem)
@@ -88,6 +98,10 @@ def fit(
         converged=base.converged,
         fit=base,
     )
+
+
+def _added(rig: Rig, plant: Plant) -> list[Candidate]:
+    return [plant.candidates[name] for name in rig.added if name in plant.candidates]
 
 
 def _untouched(problem: Problem) -> Errors:
@@ -109,15 +123,17 @@ def _rows(fit: Fit, covariance: np.ndarray) -> tuple[FittedParameter, ...]:
     rows = []
     for k, name in enumerate(unknowns.names):
         room = min(values[name] - unknowns.lower[k], unknowns.upper[k] - values[name])
+        at_bound = bool(room <= AT_BOUND * unknowns.scale[k])
+        believed = float(np.sqrt(unknowns.precision[k]))  # 1, or next to nothing
         rows.append(
             FittedParameter(
                 name=name,
                 prior=float(unknowns.prior[k]),
-                prior_deviation=float(unknowns.scale[k]),
+                prior_deviation=float(unknowns.scale[k]) if believed == 1.0 else float("inf"),
                 value=values[name],
-                deviation=float(deviation[k] * unknowns.scale[k]),
-                at_bound=bool(room <= AT_BOUND * unknowns.scale[k]),
-                flat=bool(deviation[k] > FLAT),
+                deviation=float("nan") if at_bound else float(deviation[k] * unknowns.scale[k]),
+                at_bound=at_bound,
+                flat=bool(deviation[k] * believed > FLAT) and not at_bound,
             )
         )
     return tuple(rows)

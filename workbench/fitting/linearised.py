@@ -178,7 +178,9 @@ def borrowed(
         J_x[:, :n_out, k] = (r[row] - r[0]) / START_STEP
     for k, name in enumerate(unknowns.names):
         if name in known[1].names:
-            J_p[:, :n_out, k] = near.parameters[:, :n_out, known[1].names.index(name)]
+            j = known[1].names.index(name)
+            unit_ratio = unknowns.scale[k] / known[1].scale[j]
+            J_p[:, :n_out, k] = unit_ratio * near.parameters[:, :n_out, j]
     for row, k in enumerate(new_p, start=1 + len(new_x)):
         J_p[:, :n_out, k] = (r[row] - r[0]) / h[k]
     return Linearised(point, _with_priors(windows, point, r[0]), J_p, *_factors(J_x))

@@ -5,17 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from workbench.fitting.gauss_newton import Fit, fit_windows, points_costs
 from workbench.fitting.linearised import Linearised, Point
 from workbench.fitting.noise import measured_noise
 from workbench.fitting.start_states import refit_starts
 from workbench.fitting.unknowns import Unknowns, nominal_unknowns
-from workbench.fitting.windows import MOST_WINDOWS, WINDOW_S, cut_windows, position_alone
+from workbench.fitting.windows import MOST_WINDOWS, WINDOW_S, cut_windows, one_clock, position_alone
 from workbench.plant import Candidate, Plant
 from workbench.recording import Recording
 from workbench.rig import Rig
 
 LONGEST_PIECE_S = 2.0  # of recordings of a position alone whose pieces stay whole
+STUB = 0.5  # of the median length: shorter pieces of such recordings are left out
 POSITION_WINDOW_S = 0.5  # of longer ones
 FIRST_ITERATIONS = 3  # with scales from the model as it came
 ITERATIONS = 12  # with scales from the first fit
@@ -123,13 +126,15 @@ def pose(
     Raises
     ------
     ValueError
-        If the recordings hold no whole window, or an output shows no noise.
+        If the recordings hold no whole window, differ in their sample times, or show no noise.
     """
+    one_clock([*train, *validation])
     whole = rig.fit_for(train[0])
     added = tuple(whole.candidates[name] for name in rig.added if name in whole.candidates)
     plant = staged(whole, *(c.member for c in added))
     noise = measured_noise(train, plant.measured)
-    windows = cut_windows(plant, train, noise, window_length_s(plant, train), most_windows)
+    length_s = window_length_s(plant, [*train, *validation])
+    windows = cut_windows(plant, train, noise, length_s, most_windows)
     unknowns = nominal_unknowns(plant, rig.deviations, rig.fixed, added)
     windows = windows.rescaled(windows.residuals([plant], windows.start)[0])
     rough = fit_windows(windows, unknowns, iterations=FIRST_ITERATIONS)
@@ -146,11 +151,13 @@ def window_length_s(plant: Plant, recordings: Sequence[Recording]) -> float:
     """Windows are short where pressures are recorded too.
 
     A position alone says little of flows and forces in a fifth of a second.  Short experiments,
-    such as kicks from rest, stay whole: each has a start of its own.
+    such as kicks from rest, stay whole, or as long as the shortest of them: each has a start of its
+    own.  A piece less than half as long as most is a stub that gets no window.
     """
     if not position_alone(plant):
         return WINDOW_S
-    shortest_s = min(len(p) * r.sample_time_s for r in recordings for p in r.pieces)
+    lengths_s = np.array([len(p) * r.sample_time_s for r in recordings for p in r.pieces])
+    shortest_s = float(lengths_s[lengths_s >= STUB * np.median(lengths_s)].min())
     return shortest_s if shortest_s <= LONGEST_PIECE_S else POSITION_WINDOW_S
 
 
@@ -161,7 +168,8 @@ def _held_out(
 
     Half as many windows as the training has are enough to judge a plant that is not fitted to them.
     """
-    length_s = base.windows.length * base.windows.recordings[0].sample_time_s
+    sample_time_s = base.windows.recordings[0].sample_time_s
+    length_s = base.windows.length * sample_time_s
     windows = cut_windows(base.windows.plant, validation, noise, length_s, most)
     windows = windows.scaled_like(base.windows)
     rough = refit_starts(windows, base.plant.values)
@@ -169,9 +177,16 @@ def _held_out(
 
 
 def split(recordings: Sequence[Recording]) -> tuple[list[Recording], list[Recording]]:
-    """The first two thirds of each recording, and its last third."""
-    cuts = [2 * len(recording) // 3 for recording in recordings]
+    """The first two thirds of each recording and its last third, cut between pieces near there."""
+    cuts = [_two_thirds(recording) for recording in recordings]
     early = [r.part(0, cut) for r, cut in zip(recordings, cuts, strict=True)]
     late = [r.part(cut, len(r)) for r, cut in zip(recordings, cuts, strict=True)]
     named = [replace(r, name=f"{r.name}, last third") for r in late]
     return early, named
+
+
+def _two_thirds(recording: Recording) -> int:
+    """The sample at two thirds, or the start of a piece near it."""
+    n = len(recording)
+    near = [first for first in recording.starts if n / 2 <= first <= 5 * n / 6]
+    return min(near, key=lambda first: abs(3 * first - 2 * n), default=2 * n // 3)

@@ -235,11 +235,12 @@ def cut_windows(
         If no recording holds a whole window, or their sample times differ.
     """
     recordings = tuple(recordings)
-    _one_clock(recordings)
+    one_clock(recordings)
     length = max(round(window_s / recordings[0].sample_time_s), 2)
     firsts = thinned(tuple(window_firsts(recording, length) for recording in recordings), most)
     if not any(firsts):
-        raise ValueError(f"no piece of the recordings is as long as one window of {window_s:g} s")
+        names = ", ".join(recording.name for recording in recordings)
+        raise ValueError(f"{names}: no piece is as long as one window of {window_s:g} s")
     measured = np.concatenate(
         [
             cut_rows(recording.rows(plant.measured), own, length)
@@ -257,10 +258,10 @@ def cut_windows(
     )
 
 
-def _one_clock(recordings: tuple[Recording, ...]) -> None:
+def one_clock(recordings: Iterable[Recording]) -> None:
     """Refuse recordings of different sample times: windows share one simulation."""
-    first = recordings[0]
-    for other in recordings[1:]:
+    first, *others = recordings
+    for other in others:
         if abs(other.sample_time_s - first.sample_time_s) > SAME_CLOCK * first.sample_time_s:
             raise ValueError(
                 f"{other.name} has a sample every {1e3 * other.sample_time_s:g} ms and "
