@@ -27,7 +27,7 @@ from workbench.fitting.windows import Windows
 STARTS = 2  # sizes of the scan that are tried
 SHARES = (2.0, 1.0, 0.5, 0.0)  # of the linear step of the nuisances that goes with each
 ITERATIONS = 4
-WORTH_TRYING = 3.0  # times the cost of the best start
+WORTH_TRYING = 5.0  # times the cost of the best start
 FAR = 1.5  # prior deviations: where the base has moved a parameter further, fits begin there too
 
 
@@ -80,10 +80,11 @@ def _distinct(trials: tuple[Trial, ...]) -> list[Trial]:
 def _starts(
     problem: Problem, windows: Windows, unknowns: Unknowns, profile: Profile
 ) -> list[list[Point]]:
-    """Points near the base, and where it has moved far points at the priors, for the best trials.
+    """Points near the base, and where it has moved far points at the priors.
 
-    Near the base: with more and less of the linear step of the nuisances.  At the priors: the base
-    may have moved its parameters to imitate what is missing.
+    Near the base: the best trials with more and less of the linear step of the nuisances.  At the
+    priors: all trials, since the base may have moved its parameters to imitate what is missing, and
+    then the size that is best there is too small.
     """
     base = problem.base
     starts = carried(base.point.starts, base.windows, windows)
@@ -99,4 +100,4 @@ def _starts(
     at_priors = np.where(own, base.point.t, 0.0)
     if not np.any(np.abs(base.point.t - at_priors) > FAR):
         return [near]
-    return [near, [point(at_priors, trial) for trial in trials]]
+    return [near, [point(at_priors, trial) for trial in profile.trials]]
