@@ -84,6 +84,18 @@ def test_borrowed_derivatives_have_columns_of_their_own_for_what_is_new(windows,
     assert np.array_equal(lent[:, :, mass], derivatives(near)[:, :, mass - 1])
 
 
+def test_a_lent_column_is_counted_in_the_unit_of_its_borrower(windows):
+    near = linearise(windows, KNOWN, Point(np.zeros(2), windows.start))
+    wider = unknowns_of(mass=0.1, coulomb=2.0)
+    point = Point(np.zeros(2), windows.start)
+    lent = derivatives(borrowed(near, (windows, KNOWN), windows, wider, point))
+    own = derivatives(linearise(windows, wider, point))
+    mass = len(windows.plant.state_list)
+
+    size = np.linalg.norm(own[:, :, mass])
+    assert np.linalg.norm(lent[:, :, mass] - own[:, :, mass]) < 0.01 * size
+
+
 def test_a_part_of_the_windows_is_even_and_the_same_data(windows):
     few, kept = windows.part(2)
 
