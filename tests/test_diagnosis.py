@@ -98,6 +98,13 @@ def test_without_validation_the_verdict_is_at_most_a_tie_with_a_warning(rig):
     assert any("held out" in warning for warning in found.warnings)
 
 
+def test_the_training_recording_is_no_validation(rig):
+    found = diagnose(rig, [bench(1, coulomb)], [bench(1, coulomb)])
+
+    assert found.verdict is Verdict.TIE
+    assert any("proves nothing" in warning for warning in found.warnings)
+
+
 def test_a_diagnosis_changes_nothing_and_says_the_same_twice(rig, found):
     again = diagnose(rig, [bench(1, coulomb)], [bench(2, coulomb, gauge_pa=4e5)])
 

@@ -64,3 +64,11 @@ class Recording:
         """The gap-free pieces, in order."""
         ends = (*self.starts[1:], len(self))
         return tuple(self.part(a, b) for a, b in zip(self.starts, ends, strict=True))
+
+
+def same_data(one: Recording, other: Recording) -> bool:
+    """True where two recordings hold the same samples in all channels that both have."""
+    both = [name for name in one.channels if name in other.channels]
+    return len(one) == len(other) and all(
+        np.array_equal(one[name], other[name], equal_nan=True) for name in both
+    )

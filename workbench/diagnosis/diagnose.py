@@ -32,7 +32,7 @@ from workbench.fitting.errors import errors_of
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.problem import Problem, improved_base, pose, split
 from workbench.fitting.windows import MOST_WINDOWS
-from workbench.recording import Recording
+from workbench.recording import Recording, same_data
 from workbench.rig import Rig
 
 FITTED_FIRST = 8  # candidates that are followed beyond the scan at the most
@@ -46,6 +46,8 @@ CERTAIN_SHARE = 0.5  # an accepted candidate above it needs no comparison with a
 FAR_ABOVE_NOISE = 3.0  # RMSE over noise that is worth a word where nothing is named
 
 WEAK_EVIDENCE = "no validation recording: the last third is held out, which is weak evidence"
+
+NO_EVIDENCE = "a validation recording is one of the training recordings, which proves nothing"
 
 Progress = Callable[[str], None]
 
@@ -64,7 +66,8 @@ def diagnose(
     """Which effect of the catalogue is missing, judged on held-out recordings.
 
     Without ``validation`` the last third of each recording is held out, and the verdict is at most
-    a tie, with a warning.  ``most_windows`` bounds the windows that are fitted: fewer are faster.
+    a tie, with a warning; so it is where a recording stands in both.  ``most_windows`` bounds the
+    windows that are fitted: fewer are faster.
 
     Raises
     ------
@@ -76,6 +79,8 @@ def diagnose(
     if not held_out:
         train, validation = split(train)
         warnings = (WEAK_EVIDENCE,)
+    elif any(same_data(one, other) for one in train for other in validation):
+        held_out, warnings = False, (NO_EVIDENCE,)
     progress("prior fit")
     problem = pose(rig, train, validation, most_windows)
     if not problem.base.converged:
