@@ -13,8 +13,7 @@ hour); with ``--keep`` it starts from the stored cases.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from multiprocessing import Pool
 from pathlib import Path
 
@@ -22,56 +21,78 @@ from studies.hidden_effects import public_name, recordings, user_rig
 from studies.truth.cases import STORED, drawn_cases, read_cases, write_cases
 from studies.truth.draw import HIDDEN, Case, draw_size, generator, resized
 from studies.truth.misfit import scaled
+from workbench.diagnosis.refit import refit
+from workbench.diagnosis.rough import rough_fit
+from workbench.diagnosis.scan import scan
 from workbench.fitting.gauss_newton import fit_windows
 from workbench.fitting.linearised import Point
 from workbench.fitting.problem import pose, staged
 from workbench.fitting.start_states import carried
+from workbench.recording import Recording
 
 LEAST_SHARE = 0.30
-MOST_DRAWS = 30
+MOST_ROUNDS, MOST_DRAWS = 8, 200
 ITERATIONS = 14
 
 
-@dataclass(frozen=True)
-class Drawn:
-    """A case that meets the rule, and the share of the misfit that the true effect removes."""
+def visible(
+    cases: Sequence[Case],
+    recorded: Sequence[tuple[Recording, Recording]],
+    store: Callable[[Sequence[Case]], None],
+) -> None:
+    """Draw cases again until their hidden effect can be seen; stored after every round.
 
-    case: Case
-    share: float
-
-
-def visible(case: Case) -> Drawn:
-    """The case, drawn again until its hidden effect can be seen.
-
-    A size no larger than one that was too small is not measured again.
+    ``recorded`` are the recordings of the cases as they come.  A size no larger than one that was
+    too small is not measured again.  Cases with nothing of the catalogue hidden stay.
 
     Raises
     ------
     RuntimeError
-        If no size of that many draws meets the rule.
+        If a case does not meet the rule after so many rounds.
     """
-    if case.hidden not in HIDDEN:
-        return Drawn(case, float("nan"))
-    too_small = 0.0
+    done = list(cases)
+    todo = [(k, train) for k, (train, _) in enumerate(recorded) if cases[k].hidden in HIDDEN]
+    for _ in range(MOST_ROUNDS):
+        with Pool() as several:
+            found = several.starmap(removed_share, [(done[k], r) for k, r in todo], chunksize=1)
+        for (k, _), share in zip(todo, found, strict=True):
+            print(f"{done[k].hidden:<22}{done[k].seed:>5}{done[k].size:>11.3g}{share:>7.2f}")
+        store(done)
+        again = [k for (k, _), share in zip(todo, found, strict=True) if share <= LEAST_SHARE]
+        if not again:
+            return
+        larger = scaled([_larger(done[k]) for k in again])
+        for k, case in zip(again, larger, strict=True):
+            done[k] = case
+        pairs = recordings(larger)
+        todo = [(k, train) for k, (train, _) in zip(again, pairs, strict=True)]
+    names = ", ".join(f"{done[k].hidden} seed {done[k].seed}" for k, _ in todo)
+    raise RuntimeError(f"{names}: not seen after {MOST_ROUNDS} rounds")
+
+
+def _larger(case: Case) -> Case:
+    """The case with the next drawn size above its own.
+
+    Raises
+    ------
+    RuntimeError
+        If the range ends before one is drawn.
+    """
+    size = abs(case.size)
     for _ in range(MOST_DRAWS):
-        if abs(case.size) > too_small:
-            share = removed_share(case)
-            if share > LEAST_SHARE:
-                return Drawn(case, share)
-            too_small = abs(case.size)
-            print(
-                f"{case.hidden} seed {case.seed}: {case.size:.3g} removes {share:.0%}", flush=True
-            )
         rng = generator(case.hidden, case.seed, f"size {case.redraws}")
         case = resized(case, draw_size(case.hidden, rng))
-        if abs(case.size) > too_small:
-            (case,) = scaled([case])
-    raise RuntimeError(f"{case.hidden} seed {case.seed}: no size of the range can be seen")
+        if abs(case.size) > size:
+            return case
+    raise RuntimeError(f"{case.hidden} seed {case.seed}: {size:.3g} and not seen yet")
 
 
-def removed_share(case: Case) -> float:
-    """Share of the misfit that the refit with the true effect removes, from its true size."""
-    ((train, _),) = recordings([case])
+def removed_share(case: Case, train: Recording) -> float:
+    """Share of the misfit that the refit with the true effect removes.
+
+    The refit begins at the true size, with all else at its prior and where the base left it, and
+    where that is not enough as a diagnosis does.
+    """
     problem = pose(user_rig(case), [train])
     base, candidate = problem.base, problem.whole.candidates[public_name(case)]
     windows = base.windows
@@ -85,7 +106,13 @@ def removed_share(case: Case) -> float:
         values = {**windows.plant.values, **nominal, candidate.strength: case.size}
         point = Point(unknowns.clipped(unknowns.scaled(values)), starts)
         fits.append(fit_windows(windows, unknowns, point, ITERATIONS))
-    return (base.cost - min(fit.cost for fit in fits)) / problem.misfit
+    share = (base.cost - min(fit.cost for fit in fits)) / problem.misfit
+    if share > LEAST_SHARE:
+        return share
+    (profile,) = scan(
+        problem.whole, base.windows, base.unknowns, base.point, [candidate], base.derivatives
+    )
+    return max(share, refit(problem, rough_fit(problem, profile)).drop_train)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -99,12 +126,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         cases = [case for (_, seed), case in read_cases().items() if seed in asked.seeds]
     else:
         cases = drawn_cases(asked.seeds)
-    with Pool() as several:
-        found = several.map(visible, cases, chunksize=1)
-    for each in found:
-        print(f"{each.case.hidden or 'nothing':<22}{each.case.seed:>5}{each.case.size:>11.3g}"
-              f"{each.share:>7.2f}")  # fmt: skip
-    write_cases([each.case for each in found], asked.output)
+    visible(cases, recordings(cases), lambda done: write_cases(done, asked.output))
 
 
 if __name__ == "__main__":
