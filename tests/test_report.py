@@ -149,6 +149,11 @@ def test_an_empirical_law_comes_with_its_range():
         "slide.velocity": {"low": -0.5, "high": 0.5, "unit": "m/s"},
         "chamber_a.pressure": {"low": 3e5, "high": 6e5, "unit": "Pa"},
     }
+    said = diagnosis_text(diagnosis(Verdict.NOT_IN_CATALOGUE, law=law), UNITS)
+    assert (
+        "law: drop train 80.0 %, validation 70.0 %; "
+        "seen for slide.velocity -0.5 m/s to 0.5 m/s, chamber_a.pressure 3 bar to 6 bar"
+    ) in said
 
 
 def test_a_diagnosis_reads_in_the_units_of_people():
