@@ -1,13 +1,13 @@
 """Cases whose hidden effect can be seen: the last rule of the draw, which needs the model.
 
-A size is drawn log-uniform in 15 to 60 % of typical, and drawn again until the refit with the true
-effect, begun at its true size, removes more than 30 % of the misfit that is left without it.  Below
-that the small differences of the truth are what a recording shows.  The truth itself knows no
-model, so the rule stands here and not in ``studies/truth``; the rule there (differences below 20 %
-of the hidden effect, in open-loop windows) holds again after each redraw.
+A size is drawn log-uniform in 15 to 60 % of typical, such that the refit with the true effect
+removes more than 30 % of the misfit that is left without it.  Below that the small differences of
+the truth are what a recording shows.  The truth itself knows no model, so the rule stands here and
+not in ``studies/truth``; the rule there (differences below 20 % of the hidden effect, in open-loop
+windows) holds again after each redraw.
 
-``python -m studies.hidden_cases --seeds 1 2 3`` draws all cases anew and stores them (half an
-hour); with ``--keep`` it starts from the stored cases.
+``python -m studies.hidden_cases spool_leak:2`` measures stored cases, draws those that break the
+rule again, and stores them (about ten minutes).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from multiprocessing import Pool
 from pathlib import Path
 
 from studies.hidden_effects import public_name, recordings, user_rig
-from studies.truth.cases import STORED, drawn_cases, read_cases, write_cases
+from studies.truth.cases import STORED, read_cases, write_cases
 from studies.truth.draw import HIDDEN, Case, draw_size, generator, resized
 from studies.truth.misfit import scaled
 from workbench.diagnosis.refit import refit
@@ -116,17 +116,20 @@ def removed_share(case: Case, train: Recording) -> float:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Draw and store; see the module."""
+    """Measure, draw again and store; see the module."""
     parser = argparse.ArgumentParser(prog="python -m studies.hidden_cases", description=__doc__)
-    parser.add_argument("--seeds", type=int, nargs="+", required=True)
-    parser.add_argument("--keep", action="store_true", help="start from the stored cases")
+    parser.add_argument("cases", nargs="+", metavar="EFFECT:SEED")
     parser.add_argument("-o", "--output", type=Path, default=STORED)
     asked = parser.parse_args(arguments)
-    if asked.keep:
-        cases = [case for (_, seed), case in read_cases().items() if seed in asked.seeds]
-    else:
-        cases = drawn_cases(asked.seeds)
-    visible(cases, recordings(cases), lambda done: write_cases(done, asked.output))
+    stored = read_cases()
+    named = [(name, int(seed)) for name, _, seed in (case.partition(":") for case in asked.cases)]
+
+    def store(done: Sequence[Case]) -> None:
+        stored.update(zip(named, done, strict=True))
+        write_cases(stored.values(), asked.output)
+
+    cases = [stored[key] for key in named]
+    visible(cases, recordings(cases), store)
 
 
 if __name__ == "__main__":
