@@ -31,6 +31,7 @@ from workbench.fitting.start_states import carried
 from workbench.recording import Recording
 
 LEAST_SHARE = 0.30
+LARGER = 1.25  # times a size that was too small: the next one to be measured
 MOST_ROUNDS, MOST_DRAWS = 8, 200
 ITERATIONS = 14
 
@@ -42,8 +43,8 @@ def visible(
 ) -> None:
     """Draw cases again until their hidden effect can be seen; stored after every round.
 
-    ``recorded`` are the recordings of the cases as they come.  A size no larger than one that was
-    too small is not measured again.  Cases with nothing of the catalogue hidden stay.
+    ``recorded`` are the recordings of the cases as they come.  Cases with nothing of the catalogue
+    hidden stay.
 
     Raises
     ------
@@ -71,20 +72,20 @@ def visible(
 
 
 def _larger(case: Case) -> Case:
-    """The case with the next drawn size above its own.
+    """The case with the next drawn size a quarter above its own, or more.
 
     Raises
     ------
     RuntimeError
         If the range ends before one is drawn.
     """
-    size = abs(case.size)
+    least = LARGER * abs(case.size)
     for _ in range(MOST_DRAWS):
         rng = generator(case.hidden, case.seed, f"size {case.redraws}")
         case = resized(case, draw_size(case.hidden, rng))
-        if abs(case.size) > size:
+        if abs(case.size) > least:
             return case
-    raise RuntimeError(f"{case.hidden} seed {case.seed}: {size:.3g} and not seen yet")
+    raise RuntimeError(f"{case.hidden} seed {case.seed}: {least / LARGER:.3g} is not seen yet")
 
 
 def removed_share(case: Case, train: Recording) -> float:
