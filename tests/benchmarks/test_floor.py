@@ -137,7 +137,7 @@ def test_the_floor_has_the_rates_of_the_plant(drive, library):
 @pytest.mark.slow
 @pytest.mark.benchmark(timer=time.process_time)
 def test_a_second_of_the_sine_by_hand_and_by_us(benchmark, drive, library):
-    by_us = ours(drive, drive.model.compiled_step(DT), COMMAND)
+    by_us = ours(drive, drive.model.compiled_block(DT), COMMAND)
     floor = by_hand(drive, library, COMMAND)
     benchmark.pedantic(floor, rounds=ROUNDS, warmup_rounds=1)
     exact = reference(drive, COMMAND, DT)

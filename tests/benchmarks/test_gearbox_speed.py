@@ -16,6 +16,7 @@ from gearbox_shifts import ALL_SHIFTS, POSITION, held
 from reference_solution import reference
 from scipy.integrate import solve_ivp
 
+from workbench.model import run_of
 from workbench.plants.gearbox import gearbox
 from workbench.rosenbrock import single_step
 
@@ -31,13 +32,13 @@ def actuator():
 @pytest.fixture(params=["virtual machine", "machine code"])
 def engine(request, actuator):
     compiled = request.param == "machine code"
-    step = actuator.model.compiled_step(DT) if compiled else actuator.model.step(DT)
-    return request.param, step
+    block = actuator.model.compiled_block(DT) if compiled else actuator.model.block(DT)
+    return request.param, block
 
 
-def ours(plant, step, commands):
+def ours(plant, block, commands):
     n = commands.shape[1] - 1
-    run = step.mapaccum(n)
+    run = run_of(block, n)
     return lambda: run(plant.initial, commands[:, :-1], np.zeros((0, n)), plant.nominal[2])
 
 
@@ -65,8 +66,8 @@ def peer(plant, method, commands):
 
 @pytest.mark.benchmark(timer=time.process_time)
 def test_four_shifts(benchmark, actuator, engine):
-    commands, (name, step) = held(ALL_SHIFTS, DT), engine
-    x = benchmark.pedantic(ours(actuator, step, commands), rounds=5, warmup_rounds=1).full()
+    commands, (name, block) = held(ALL_SHIFTS, DT), engine
+    x = benchmark.pedantic(ours(actuator, block, commands), rounds=5, warmup_rounds=1).full()
     if benchmark.enabled:
         speed = DT * (commands.shape[1] - 1) / benchmark.stats.stats.min
         exact = reference(actuator, commands, DT, contact=True)[:, 1:]
@@ -103,10 +104,10 @@ def test_where_the_time_goes(benchmark, actuator):
 @pytest.mark.benchmark(timer=time.process_time)
 @pytest.mark.parametrize("method", ["LSODA", "Radau"])
 def test_a_shift_by_scipy_on_the_same_rates(benchmark, actuator, engine, method):
-    name, step = engine
+    name, block = engine
     commands = held(ALL_SHIFTS, DT)[:, : PEER_SAMPLES if benchmark.enabled else 3]
     x = benchmark.pedantic(peer(actuator, method, commands), rounds=1)
-    run = ours(actuator, step, commands)
+    run = ours(actuator, block, commands)
     start = time.process_time()
     for _ in range(5):
         end = run()[:, -1].full().ravel()

@@ -17,6 +17,8 @@ import pytest
 from reference_solution import reference
 from scipy.integrate import solve_ivp
 
+from workbench.model import run_of
+
 DT = 1e-3
 SAMPLES = 1001
 TIME_S = DT * np.arange(SAMPLES)
@@ -35,8 +37,8 @@ def rates_at(drive, u):
     return lambda t, x: f(x, u(t), [], p)[0].full().ravel()
 
 
-def by_ours(drive, step):
-    run = step.mapaccum(SAMPLES - 1)
+def by_ours(drive, block):
+    run = run_of(block, SAMPLES - 1)
     p, none = drive.nominal[2], np.zeros((0, SAMPLES - 1))
     return lambda: run(drive.initial, HELD_V[None, :-1], none, p).full()
 
@@ -114,8 +116,8 @@ def by_do_mpc(drive):
 
 
 RIVALS = {
-    "ours, virtual machine": lambda drive: by_ours(drive, drive.model.step(DT)),
-    "ours, machine code": lambda drive: by_ours(drive, drive.model.compiled_step(DT)),
+    "ours, virtual machine": lambda drive: by_ours(drive, drive.model.block(DT)),
+    "ours, machine code": lambda drive: by_ours(drive, drive.model.compiled_block(DT)),
     "scipy LSODA, one call": lambda drive: by_scipy(drive, "LSODA"),
     "scipy Radau, one call": lambda drive: by_scipy(drive, "Radau"),
     "python-control": by_python_control,

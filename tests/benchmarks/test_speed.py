@@ -11,6 +11,8 @@ import pytest
 from reference_solution import reference
 from scipy.integrate import solve_ivp
 
+from workbench.model import run_of
+
 DT = 1e-3
 CASES = {
     "sine": 4.95 + 0.8 * np.sin(np.pi * DT * np.arange(4001)),
@@ -20,9 +22,9 @@ CASES = {
 PEER_SAMPLES = 501  # of the sine; the peer restarts at every one, as the command demands
 
 
-def ours(drive, step, command):
+def ours(drive, block, command):
     n = len(command) - 1
-    run = step.mapaccum(n)
+    run = run_of(block, n)
     return lambda: run(drive.initial, command[None, :-1], np.zeros((0, n)), drive.nominal[2])
 
 
@@ -56,15 +58,15 @@ def times_real_time(benchmark, samples):
 @pytest.fixture(params=["virtual machine", "machine code"])
 def engine(request, drive):
     compiled = request.param == "machine code"
-    step = drive.model.compiled_step(DT) if compiled else drive.model.step(DT)
-    return request.param, step
+    block = drive.model.compiled_block(DT) if compiled else drive.model.block(DT)
+    return request.param, block
 
 
 @pytest.mark.benchmark(timer=time.process_time)
 @pytest.mark.parametrize("case", CASES)
 def test_a_simulation_of_the_drive(benchmark, drive, engine, case):
-    command, (name, step) = CASES[case], engine
-    x = benchmark.pedantic(ours(drive, step, command), rounds=5, warmup_rounds=1).full()
+    command, (name, block) = CASES[case], engine
+    x = benchmark.pedantic(ours(drive, block, command), rounds=5, warmup_rounds=1).full()
     if benchmark.enabled:
         speed = times_real_time(benchmark, len(command) - 1)
         exact = reference(drive, command, DT, contact=case == "full voltage")
@@ -86,10 +88,10 @@ def errors(drive, x, exact):
 @pytest.mark.benchmark(timer=time.process_time)
 @pytest.mark.parametrize("method", ["LSODA", "Radau"])
 def test_a_simulation_by_scipy_on_the_same_rates(benchmark, drive, engine, method):
-    name, step = engine
+    name, block = engine
     command = CASES["sine"][: PEER_SAMPLES if benchmark.enabled else 5]
     x = benchmark.pedantic(peer(drive, method, command), rounds=1)
-    run = ours(drive, step, command)
+    run = ours(drive, block, command)
     start = time.process_time()
     for _ in range(5):
         end = run()[:, -1].full().ravel()

@@ -11,6 +11,8 @@ from conftest import PLANT_MODELS
 from reference_solution import reference
 from test_speed import peer, times_real_time
 
+from workbench.model import run_of
+
 DT = 1e-3
 TIME_S = DT * np.arange(2001)
 SINE = 5.25 + 0.5 * np.sin(np.pi * TIME_S)
@@ -27,9 +29,9 @@ A_TENTH = {"m": 5e-6, "rad": np.radians(0.005), "pa": 50.0}  # of the sensor noi
 PEER_SAMPLES = 101
 
 
-def ours(plant, step, command):
+def ours(plant, block, command):
     n = command.shape[1] - 1
-    run = step.mapaccum(n)
+    run = run_of(block, n)
     return lambda: run(plant.initial, command[:, :-1], np.zeros((0, n)), plant.nominal[2])
 
 
@@ -50,16 +52,16 @@ def engine(request):
 
 def built(name, engine):
     plant = PLANT_MODELS[name].lean()
-    make = plant.model.compiled_step if engine == "machine code" else plant.model.step
+    make = plant.model.compiled_block if engine == "machine code" else plant.model.block
     return plant, make(DT)
 
 
 @pytest.mark.benchmark(timer=time.process_time)
 @pytest.mark.parametrize("case", CASES, ids="-".join)
 def test_a_simulation(benchmark, engine, case):
-    plant, step = built(case[0], engine)
+    plant, block = built(case[0], engine)
     command = CASES[case]
-    x = benchmark.pedantic(ours(plant, step, command), rounds=5, warmup_rounds=1).full()
+    x = benchmark.pedantic(ours(plant, block, command), rounds=5, warmup_rounds=1).full()
     if benchmark.enabled:
         speed = times_real_time(benchmark, command.shape[1] - 1)
         exact = reference(plant, command, DT, contact="stops" in case[1])
@@ -75,10 +77,10 @@ def test_a_simulation(benchmark, engine, case):
 @pytest.mark.benchmark(timer=time.process_time)
 @pytest.mark.parametrize("method", ["LSODA", "Radau"])
 def test_the_rig_by_scipy_on_the_same_rates(benchmark, method):
-    plant, step = built("crr_rig", "virtual machine")
+    plant, block = built("crr_rig", "virtual machine")
     command = SINE[: PEER_SAMPLES if benchmark.enabled else 5]
     x = benchmark.pedantic(peer(plant, method, command), rounds=1)
-    end = ours(plant, step, command[None])()[:, -1].full().ravel()
+    end = ours(plant, block, command[None])()[:, -1].full().ravel()
     if benchmark.enabled:
         speed = times_real_time(benchmark, len(command) - 1)
         print(f"\ncrr_rig sine, {method}: {speed:.2f} times real time")
@@ -90,10 +92,10 @@ def test_the_rig_by_scipy_on_the_same_rates(benchmark, method):
 @pytest.mark.parametrize("case", [key for key in CASES if key[0] != "crr_leg"], ids="-".join)
 def test_the_error_is_below_a_tenth_of_the_sensor_noise(case):
     """Against Radau at rtol 1e-9, over the first half second."""
-    plant, step = built(case[0], "virtual machine")
+    plant, block = built(case[0], "virtual machine")
     command = CASES[case][:, :501]
     exact = reference(plant, command, DT, contact="stops" in case[1])
-    worst, mean = errors(plant, ours(plant, step, command)().full(), exact[:, 1:])
+    worst, mean = errors(plant, ours(plant, block, command)().full(), exact[:, 1:])
 
     assert mean < 1.0
     assert worst < 10.0

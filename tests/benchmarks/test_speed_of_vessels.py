@@ -11,6 +11,7 @@ import pytest
 from reference_solution import reference
 from scipy.integrate import solve_ivp
 
+from workbench.model import run_of
 from workbench.plants import PLANTS
 
 DT = 1e-3
@@ -36,8 +37,8 @@ def case(request):
     return PLANTS[request.param]().with_values(values).lean(), command
 
 
-def ours(plant, step, command, n):
-    run = step.mapaccum(n)
+def ours(plant, block, command, n):
+    run = run_of(block, n)
     u = np.zeros((0, n)) if command is None else command[None, :n]
     return lambda: run(plant.initial, u, np.zeros((0, n)), plant.nominal[2])
 
@@ -54,7 +55,7 @@ def engine(request):
 
 
 def step_of(plant, engine):
-    return plant.model.compiled_step(DT) if engine == "machine code" else plant.model.step(DT)
+    return plant.model.compiled_block(DT) if engine == "machine code" else plant.model.block(DT)
 
 
 @pytest.mark.benchmark(timer=time.process_time)
@@ -76,7 +77,7 @@ def test_the_integrator_errs_by_less_than_a_tenth_of_the_sensor_noise(name):
     """Of 1 kPa on the soft joint and 500 Pa on the reservoir (physics.md 2)."""
     command, values = CASES[name]
     plant = PLANTS[name]().with_values(values).lean()
-    x = ours(plant, plant.model.step(DT), command, COMPARED)().full()
+    x = ours(plant, plant.model.block(DT), command, COMPARED)().full()
 
     assert np.abs(x - exact(plant, command, COMPARED))[0].max() < TENTH_OF_NOISE_PA[name]
 
@@ -107,7 +108,7 @@ def test_a_vessel_by_scipy_on_the_same_rates(benchmark, case, method):
         return x
 
     x = benchmark.pedantic(run, rounds=1)
-    end = ours(plant, model.step(DT), command, n)()[:, -1].full().ravel()
+    end = ours(plant, model.block(DT), command, n)()[:, -1].full().ravel()
     if benchmark.enabled:
         print(f"\n{plant.name}, {method}: {DT * n / benchmark.stats.stats.min:.2f} times real time")
 

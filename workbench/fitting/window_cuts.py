@@ -27,9 +27,8 @@ def window_run(plant: Plant, sample_time_s: float, length: int) -> ca.Function:
     )
     x = _behind_sensors(model, x0, u[:, 0], d[:, 0], p)
     if model.states:
-        later = model.compiled_step(sample_time_s).mapaccum(length - 1)
-        columns = ca.repmat(p, 1, length - 1)
-        x = ca.horzcat(x, later(x, u[:, :-1], d[:, :-1], columns))
+        later = model.run(sample_time_s, length - 1)
+        x = ca.horzcat(x, later(x, u[:, :-1], d[:, :-1], p))
     else:
         x = ca.MX(0, length)
     y = model.h.map(length)(x, u, d, ca.repmat(p, 1, length))
