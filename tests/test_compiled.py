@@ -223,3 +223,18 @@ def test_a_folder_that_cannot_be_written_is_not_in_the_way(cache, monkeypatch, t
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
 
     assert machine_code(compiled(small()))
+
+
+@pytest.mark.parametrize("samples", [1, 19, 20, 21, 45])
+def test_blocks_step_as_single_samples_do(drive, samples):
+    model, (_, d, p) = drive.model, drive.nominal
+    u = 4.95 + 2.0 * np.sin(np.linspace(0.0, 3.0, samples))[None]
+    step, x = model.compiled_step(1e-3), drive.initial
+    one_by_one = []
+    for command in u.T:
+        x = step(x, command, d, p).full().ravel()
+        one_by_one.append(x)
+
+    found = model.run(1e-3, samples)(drive.initial, u, np.zeros((0, samples)), p).full()
+
+    np.testing.assert_array_equal(found, np.transpose(one_by_one))
