@@ -2,7 +2,7 @@
 
 Every case hides one effect in the independent truth of ``studies/truth``, beside a dozen small
 differences that are always there; one case hides nothing, one hides a law that no catalogue has.
-The user's rig lacks the effect.  Right is: the hidden one first, or first in a printed tie.
+The user's rig lacks the effect.  Right is: the hidden one first, or in a printed tie.
 
 ``python -m studies.hidden_effects 1 2 3`` prints the confusion matrix of three seeds.
 """
@@ -134,6 +134,18 @@ def confusion(found: Iterable[Answer]) -> str:
     return "\n".join(lines)
 
 
+def summary(found: Iterable[Answer]) -> str:
+    """How many hidden effects of the catalogue lead, lead or tie, and are named by the verdict."""
+    hidden = [each for each in found if each.case.hidden in HIDDEN]
+    naming = (Verdict.FOUND, Verdict.TIE)
+    first = sum(each.place == 1 for each in hidden)
+    named = sum(each.tied and each.diagnosis.verdict in naming for each in hidden)
+    return (
+        f"{first} of {len(hidden)} first, {sum(each.tied for each in hidden)} first or in the tie, "
+        f"{named} with a verdict that says so"
+    )
+
+
 def _recording(table: Mapping[str, np.ndarray], name: str) -> Recording:
     channels = {
         public: np.asarray(table[column]) * factor
@@ -149,4 +161,5 @@ if __name__ == "__main__":
     def show(found: Answer) -> None:
         print(confusion([found]).splitlines()[1], flush=True)
 
-    print(confusion(answers([int(seed) for seed in sys.argv[1:]] or [1], show)))
+    said = answers([int(seed) for seed in sys.argv[1:]] or [1], show)
+    print(confusion(said), summary(said), sep="\n\n")
