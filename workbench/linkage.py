@@ -49,7 +49,7 @@ class Joint(Part):
 
     def states(self) -> Iterator[State]:
         yield State("angle_rad", self.initial_angle_rad, scale=1.0, tolerance=5e-7)
-        yield State("velocity_rad_s", initial=0.0, scale=1.0, tolerance=2e-2)
+        yield State("velocity_rad_s", initial=0.0, scale=1.0, tolerance=1e-2)
 
     def guess(self, seen: Mapping[str, np.ndarray]) -> dict[str, tuple[np.ndarray | float, float]]:
         angle_rad = seen.get(f"{self.name}.angle_rad")
