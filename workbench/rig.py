@@ -12,7 +12,7 @@ from pathlib import Path
 from workbench.causes import why_not
 from workbench.effect import Parameter
 from workbench.errors import InputError, Message, listed
-from workbench.plant import Plant
+from workbench.plant import Candidate, Plant
 from workbench.plant_files import plant_named
 from workbench.recording import Recording
 from workbench.recording_format import RecordingFormat, default_format, read_format
@@ -72,6 +72,10 @@ class Rig:
     def ambient_pa(self) -> float:
         """The pressure that gauge pressures count from."""
         return self.plant.values.get(AMBIENT, STANDARD_ATMOSPHERE_PA)
+
+    def added_to(self, plant: Plant) -> tuple[Candidate, ...]:
+        """The causes that the rig added, as far as this plant has a place for them."""
+        return tuple(plant.candidates[name] for name in self.added if name in plant.candidates)
 
     def fit_for(self, recording: Recording) -> Plant:
         """The plant with the optional inputs and the outputs that this recording carries.

@@ -172,7 +172,7 @@ def accept(rig: Rig, diagnosis: Diagnosis) -> Addition:
 def pose_again(rig: Rig, diagnosis: Diagnosis) -> Problem:
     """The problem that a diagnosis was made on, without fitting it again."""
     plant = rig.fit_for(diagnosis.base.windows.recordings[0])
-    added = tuple(plant.candidates[n] for n in rig.added if n in plant.candidates)
+    added = rig.added_to(plant)
     return Problem(rig, plant, added, diagnosis.base, diagnosis.base_validation)
 
 

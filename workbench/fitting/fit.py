@@ -13,7 +13,7 @@ from workbench.fitting.posterior import fitted_rig, posterior_covariance
 from workbench.fitting.problem import Problem, pose
 from workbench.fitting.start_states import refit_starts
 from workbench.fitting.unknowns import nominal_unknowns
-from workbench.plant import Candidate, Plant, require
+from workbench.plant import require
 from workbench.recording import Recording
 from workbench.rig import Rig
 
@@ -80,7 +80,7 @@ def fit(
         held = replace(rig, fixed=rig.fixed | others)
     else:
         held = rig
-    free = nominal_unknowns(plant, held.deviations, held.fixed, _added(held, plant)).names
+    free = nominal_unknowns(plant, held.deviations, held.fixed, held.added_to(plant)).names
     if not free:
         names = ", ".join(only) or "the plant"
         raise ValueError(f"nothing to fit: {names} is fixed or has no uncertainty in {rig.name}")
@@ -98,10 +98,6 @@ def fit(
         converged=base.converged,
         fit=base,
     )
-
-
-def _added(rig: Rig, plant: Plant) -> list[Candidate]:
-    return [plant.candidates[name] for name in rig.added if name in plant.candidates]
 
 
 def _untouched(problem: Problem) -> Errors:

@@ -130,7 +130,7 @@ def pose(
     """
     one_clock([*train, *validation])
     whole = rig.fit_for(train[0])
-    added = tuple(whole.candidates[name] for name in rig.added if name in whole.candidates)
+    added = rig.added_to(whole)
     plant = staged(whole, *(c.member for c in added))
     noise = measured_noise(train, plant.measured)
     length_s = window_length_s(plant, [*train, *validation])

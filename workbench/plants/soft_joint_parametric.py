@@ -12,12 +12,10 @@ from dataclasses import replace
 from workbench.effects import (
     CommandDelay,
     ParametricValve,
-    PressureSensorOffset,
     PwmLag,
-    SensorLag,
-    SensorScale,
     ValveHysteresis,
 )
+from workbench.effects.sensors import sensor_flaws
 from workbench.parts import Atmosphere, Supply
 from workbench.plant import Plant, Signal
 from workbench.plants.soft_joint import (
@@ -53,11 +51,7 @@ def soft_joint_parametric() -> Plant:
                 overlap_share=OVERLAP,
                 time_constant_s=AREA_MAP_S,
             ),
-            SensorLag(
-                name="sensor_lag@bellows.pressure", signal=PRESSURE, unit=1e5, initial=ATMOSPHERE_PA
-            ),
-            SensorScale(name="sensor_scale@bellows.pressure", signal=PRESSURE),
-            PressureSensorOffset(name="sensor_offset@bellows.pressure", signal=PRESSURE),
+            *sensor_flaws({PRESSURE: ATMOSPHERE_PA}),
         ),
         commands=(Signal(COMMAND, nominal=NEUTRAL, lower=0.0, upper=1.0),),
         optional_inputs=(Signal("supply.pressure_pa", nominal=SUPPLY_PA),),

@@ -111,7 +111,7 @@ def enough_samples(rig: Rig, recordings: Sequence[Recording], only: Sequence[str
         Naming the recordings, with both numbers.
     """
     plant = rig.plant
-    added = [c for name, c in plant.candidates.items() if name in rig.added]
+    added = rig.added_to(plant)
     free = only or nominal_unknowns(plant, rig.deviations, rig.fixed, added).names
     samples = sum(map(len, recordings))
     if samples < len(free):
