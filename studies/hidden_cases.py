@@ -17,10 +17,10 @@ from collections.abc import Callable, Sequence
 from multiprocessing import Pool
 from pathlib import Path
 
-from studies.hidden_effects import public_name, recordings, user_rig
-from studies.truth.cases import STORED, read_cases, write_cases
-from studies.truth.draw import HIDDEN, Case, draw_size, generator, resized
-from studies.truth.misfit import scaled
+from studies.hidden_benches import BENCHES, SERVO_DRIVE, bench_of
+from studies.hidden_effects import recordings
+from studies.truth.case import Case, generator, resized
+from studies.truth.cases import read_cases, write_cases
 from workbench.diagnosis.refit import refit
 from workbench.diagnosis.rough import rough_fit
 from workbench.diagnosis.scan import scan
@@ -52,7 +52,7 @@ def visible(
         If a case does not meet the rule after so many rounds.
     """
     done = list(cases)
-    todo = [(k, train) for k, (train, _) in enumerate(recorded) if cases[k].hidden in HIDDEN]
+    todo = [(k, train) for k, (train, _) in enumerate(recorded) if _hides(cases[k])]
     for _ in range(MOST_ROUNDS):
         with Pool() as several:
             found = several.starmap(removed_share, [(done[k], r) for k, r in todo], chunksize=1)
@@ -62,13 +62,17 @@ def visible(
         again = [k for (k, _), share in zip(todo, found, strict=True) if share <= LEAST_SHARE]
         if not again:
             return
-        larger = scaled([_larger(done[k]) for k in again])
+        larger = bench_of(cases[0]).truth.scaled([_larger(done[k]) for k in again])
         for k, case in zip(again, larger, strict=True):
             done[k] = case
         pairs = recordings(larger)
         todo = [(k, train) for k, (train, _) in zip(again, pairs, strict=True)]
     names = ", ".join(f"{done[k].hidden} seed {done[k].seed}" for k, _ in todo)
     raise RuntimeError(f"{names}: not seen after {MOST_ROUNDS} rounds")
+
+
+def _hides(case: Case) -> bool:
+    return bench_of(case).public_name(case) is not None
 
 
 def _larger(case: Case) -> Case:
@@ -79,7 +83,7 @@ def _larger(case: Case) -> Case:
     RuntimeError
         If the range ends before one is drawn.
     """
-    least = LARGER * abs(case.size)
+    least, draw_size = LARGER * abs(case.size), bench_of(case).truth.draw_size
     for _ in range(MOST_DRAWS):
         rng = generator(case.hidden, case.seed, f"size {case.redraws}")
         case = resized(case, draw_size(case.hidden, rng))
@@ -94,8 +98,9 @@ def removed_share(case: Case, train: Recording) -> float:
     The refit begins at the true size, with all else at its prior and where the base left it, and
     where that is not enough as a diagnosis does.
     """
-    problem = pose(user_rig(case), [train])
-    base, candidate = problem.base, problem.whole.candidates[public_name(case)]
+    bench = bench_of(case)
+    problem = pose(bench.user_rig(case), [train])
+    base, candidate = problem.base, problem.whole.candidates[bench.public_name(case)]
     windows = base.windows
     if candidate.strength not in windows.plant.values:
         windows = windows.with_plant(staged(problem.whole, candidate.member))
@@ -120,14 +125,16 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Measure, draw again and store; see the module."""
     parser = argparse.ArgumentParser(prog="python -m studies.hidden_cases", description=__doc__)
     parser.add_argument("cases", nargs="+", metavar="EFFECT:SEED")
-    parser.add_argument("-o", "--output", type=Path, default=STORED)
+    parser.add_argument("--plant", choices=BENCHES, default=SERVO_DRIVE.plant)
+    parser.add_argument("-o", "--output", type=Path, help="instead of the plant's stored cases")
     asked = parser.parse_args(arguments)
-    stored = read_cases()
+    file = BENCHES[asked.plant].truth.stored
+    stored = read_cases(file)
     named = [(name, int(seed)) for name, _, seed in (case.partition(":") for case in asked.cases)]
 
     def store(done: Sequence[Case]) -> None:
         stored.update(zip(named, done, strict=True))
-        write_cases(stored.values(), asked.output)
+        write_cases(stored.values(), asked.output or file)
 
     cases = [stored[key] for key in named]
     visible(cases, recordings(cases), store)

@@ -1,42 +1,25 @@
 """Study ``hidden-effects``: a hidden effect is to be found in recordings that other code made.
 
-Every case hides one effect in the independent truth of ``studies/truth``, beside a dozen small
+Every case hides one effect in an independent truth of ``studies/truth``, beside a dozen small
 differences that are always there; one case hides nothing, one hides a law that no catalogue has.
 The user's rig lacks the effect.  Right is: the hidden one first, or in a printed tie.
 
-``python -m studies.hidden_effects 1 2 3`` prints the confusion matrix of three seeds.
+``python -m studies.hidden_effects 1 2 3`` prints the confusion matrix of three seeds on the servo
+drive, with ``--plant crr_rig`` on another plant.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+import argparse
+from collections.abc import Callable, Collection, Iterable, Sequence
+from dataclasses import dataclass
 
-import numpy as np
-
+from studies.hidden_benches import BENCHES, SERVO_DRIVE, Bench, bench_of
+from studies.truth.case import Case
 from studies.truth.cases import read_cases
-from studies.truth.draw import HIDDEN, Case
-from studies.truth.record import record
 from workbench.diagnosis.diagnose import diagnose
 from workbench.diagnosis.result import Diagnosis, Verdict
 from workbench.recording import Recording
-from workbench.rig import Rig, default_rig
-
-PLANT = "servo_drive"
-CHANNELS = {
-    "command_V": ("valve.command_v", 1.0),
-    "position_mm": ("slide.position_m", 1e-3),
-    "pressure_a_bar": ("chamber_a.pressure_pa", 1e5),
-    "pressure_b_bar": ("chamber_b.pressure_pa", 1e5),
-    "supply_bar": ("supply.pressure_pa", 1e5),
-}
-# Small differences that every truth has and the catalogue can name: a second-order valve, lags in
-# the pressure sensors, and friction that varies along the stroke.
-ALWAYS_THERE = ("valve_lag", "command_delay", "sensor_lag", "friction_position")
-PLACES = {
-    "chamber_leak": "chamber_leak@chamber_a",
-    "sensor_offset": "sensor_offset@chamber_a.pressure",
-}
 
 
 @dataclass(frozen=True)
@@ -58,48 +41,43 @@ class Answer:
         return self.diagnosis.ranking[0].candidate.name
 
     @property
+    def in_catalogue(self) -> bool:
+        """Whether the hidden effect is one that can be named."""
+        return self.case.hidden in bench_of(self.case).truth.hidden
+
+    @property
     def right(self) -> bool:
         """Whether the answer passes: see the module."""
         verdict = self.diagnosis.verdict
         if self.case.hidden is None:
             silent = verdict in (Verdict.NOTHING_MISSING, Verdict.SMALL_PROXY)
             names = verdict in (Verdict.FOUND, Verdict.TIE)
-            return silent or (names and self.named.partition("@")[0] in ALWAYS_THERE)
-        if self.case.hidden not in HIDDEN:
+            small = bench_of(self.case).always_there
+            return silent or (names and self.named.partition("@")[0] in small)
+        if not self.in_catalogue:
             return verdict is Verdict.NOT_IN_CATALOGUE
         return self.tied
 
 
-def public_name(case: Case) -> str | None:
-    """The hidden effect as the catalogue names it; None where it is not in there."""
-    return PLACES.get(case.hidden, case.hidden) if case.hidden in HIDDEN else None
-
-
-def user_rig(case: Case) -> Rig:
-    """The rig of a user who does not know of the hidden effect."""
-    rig = default_rig(PLANT)
-    name = public_name(case)
-    if name is None:
-        return rig
-    candidate = rig.plant.candidates[name]
-    return replace(rig, plant=rig.plant.at_null(candidate), removed=(name,))
-
-
 def recordings(cases: Iterable[Case]) -> list[tuple[Recording, Recording]]:
-    """Training and validation recordings, all made in one batch."""
+    """Training and validation recordings of one plant's cases, all made in one batch."""
     cases = list(cases)
-    pairs = record(cases)
+    (bench,) = {case.plant: bench_of(case) for case in cases}.values()
+    pairs = bench.truth.record(cases)
     return [
-        (_recording(train, f"{case.hidden} training"), _recording(held_out, f"{case.hidden} other"))
+        (
+            bench.recording(train, f"{case.hidden} training"),
+            bench.recording(held_out, f"{case.hidden} other"),
+        )
         for case, (train, held_out) in zip(cases, pairs, strict=True)
     ]
 
 
 def answer(case: Case, train: Recording, validation: Recording) -> Answer:
     """Diagnose one case."""
-    diagnosis = diagnose(user_rig(case), [train], [validation])
+    diagnosis = diagnose(bench_of(case).user_rig(case), [train], [validation])
     order = [row.candidate.name for row in diagnosis.ranking]
-    name = public_name(case)
+    name = bench_of(case).public_name(case)
     place = order.index(name) + 1 if name in order else 0
     leader = diagnosis.ranking[0]
     printed = diagnosis.verdict is Verdict.TIE and name in leader.tied_with
@@ -108,15 +86,23 @@ def answer(case: Case, train: Recording, validation: Recording) -> Answer:
 
 
 def answers(
-    seeds: Iterable[int], show: Callable[[Answer], None] = lambda found: None
+    cases: Sequence[Case], show: Callable[[Answer], None] = lambda found: None
 ) -> list[Answer]:
-    """Every stored case of these seeds."""
-    chosen = [case for (_, seed), case in read_cases().items() if seed in set(seeds)]
+    """Diagnose some cases of one plant."""
     found = []
-    for case, (train, held_out) in zip(chosen, recordings(chosen), strict=True):
+    for case, (train, held_out) in zip(cases, recordings(cases), strict=True):
         found.append(answer(case, train, held_out))
         show(found[-1])
     return found
+
+
+def stored(bench: Bench, seeds: Collection[int], only: Collection[str] | None = None) -> list[Case]:
+    """The stored cases of these seeds, of all effects or of some."""
+    return [
+        case
+        for (hidden, seed), case in read_cases(bench.truth.stored).items()
+        if seed in seeds and (only is None or (hidden or "nothing") in only)
+    ]
 
 
 def confusion(found: Iterable[Answer]) -> str:
@@ -136,7 +122,7 @@ def confusion(found: Iterable[Answer]) -> str:
 
 def summary(found: Iterable[Answer]) -> str:
     """How many hidden effects of the catalogue lead, lead or tie, and are named by the verdict."""
-    hidden = [each for each in found if each.case.hidden in HIDDEN]
+    hidden = [each for each in found if each.in_catalogue]
     naming = (Verdict.FOUND, Verdict.TIE)
     first = sum(each.place == 1 for each in hidden)
     named = sum(each.tied and each.diagnosis.verdict in naming for each in hidden)
@@ -146,20 +132,20 @@ def summary(found: Iterable[Answer]) -> str:
     )
 
 
-def _recording(table: Mapping[str, np.ndarray], name: str) -> Recording:
-    channels = {
-        public: np.asarray(table[column]) * factor
-        for column, (public, factor) in CHANNELS.items()
-        if column in table
-    }
-    return Recording(name, 1e-3, channels, source="studies/truth")
-
-
-if __name__ == "__main__":
-    import sys
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Answer the stored cases of some seeds; see the module."""
+    parser = argparse.ArgumentParser(prog="python -m studies.hidden_effects", description=__doc__)
+    parser.add_argument("--plant", choices=BENCHES, default=SERVO_DRIVE.plant)
+    parser.add_argument("--only", nargs="+", metavar="EFFECT", help="instead of every effect")
+    parser.add_argument("seeds", type=int, nargs="*", default=[1])
+    asked = parser.parse_args(arguments)
 
     def show(found: Answer) -> None:
         print(confusion([found]).splitlines()[1], flush=True)
 
-    said = answers([int(seed) for seed in sys.argv[1:]] or [1], show)
+    said = answers(stored(BENCHES[asked.plant], asked.seeds, asked.only), show)
     print(confusion(said), summary(said), sep="\n\n")
+
+
+if __name__ == "__main__":
+    main()

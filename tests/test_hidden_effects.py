@@ -9,7 +9,8 @@ from functools import cache
 
 import pytest
 
-from studies.hidden_effects import answer, confusion, public_name, recordings, user_rig
+from studies.hidden_benches import SERVO_DRIVE
+from studies.hidden_effects import answer, confusion, recordings
 from studies.truth.cases import read_cases
 from studies.truth.draw import HIDDEN
 from workbench.diagnosis.result import DecidedBy, Verdict
@@ -35,13 +36,13 @@ def test_a_hidden_effect_comes_first_with_its_size(hidden):
     leader = found.diagnosis.ranking[0]
     (size,) = leader.size.values()
 
-    assert leader.candidate.name == public_name(found.case), confusion([found])
+    assert leader.candidate.name == SERVO_DRIVE.public_name(found.case), confusion([found])
     assert found.diagnosis.verdict in (Verdict.FOUND, Verdict.TIE)
     assert size.value == pytest.approx(found.case.size, rel=0.25)
     assert leader.drop_validation > 0.2
     assert droop(found).decided_by is DecidedBy.NOT_APPLICABLE  # the supply is recorded
     asked = sorted(row.candidate.name for row in found.diagnosis.ranking)
-    assert asked == sorted(user_rig(found.case).plant.candidates)
+    assert asked == sorted(SERVO_DRIVE.user_rig(found.case).plant.candidates)
 
 
 @pytest.mark.slow
@@ -72,7 +73,7 @@ def test_a_law_outside_the_catalogue_is_called_that():
 
 
 def test_the_user_s_rig_lacks_what_is_hidden():
-    rig = user_rig(CASES["coulomb_friction", SEED])
+    rig = SERVO_DRIVE.user_rig(CASES["coulomb_friction", SEED])
 
     assert rig.plant.values["friction.coulomb_force_n"] == 0.0
-    assert user_rig(CASES[None, SEED]).plant.values["friction.coulomb_force_n"] > 0.0
+    assert SERVO_DRIVE.user_rig(CASES[None, SEED]).plant.values["friction.coulomb_force_n"] > 0.0

@@ -10,7 +10,8 @@ import pytest
 
 from studies.truth import draw as draws
 from studies.truth import drive as d
-from studies.truth import misfit, restriction
+from studies.truth import misfit, restriction, rule
+from studies.truth.case import shrink
 from studies.truth.integrate import open_loop
 from studies.truth.manoeuvre import training_reference, validation_reference
 from studies.truth.record import HIDDEN, draw, drive_of, record, run_cases, write_csv
@@ -195,10 +196,10 @@ def test_the_hidden_quantity_keeps_its_size_and_the_supply_error_needs_a_blind_s
 
 
 def test_halving_stops_below_a_fifth():
-    found = misfit.Misfit(10.0, {"small": 1.9, "large": 2.1, "huge": 40.0})
-    assert misfit.halvings(found) == {"large": 0.5, "huge": 0.125}
+    found = rule.Misfit(10.0, {"small": 1.9, "large": 2.1, "huge": 40.0})
+    assert rule.halvings(found) == {"large": 0.5, "huge": 0.125}
     case = draw("valve_lag", 1)
-    smaller = draws.shrink(draws.shrink(case, {"area_exponent": 0.5}), {"area_exponent": 0.5})
+    smaller = shrink(shrink(case, {"area_exponent": 0.5}), {"area_exponent": 0.5})
     assert dict(smaller.shrunk) == {"area_exponent": 0.25}
 
 
@@ -244,5 +245,5 @@ def test_all_effects_are_recorded_inside_the_stroke_with_rests_and_speed():
 def test_after_scaling_no_difference_hides_the_effect():
     case = misfit.scaled([draw("constant_force", 1)])[0]
     found = misfit.misfits([case])[0]
-    assert found.hidden >= misfit.VISIBLE
-    assert max(found.differences.values()) <= misfit.LARGEST_SHARE * found.hidden
+    assert found.hidden >= rule.VISIBLE
+    assert max(found.differences.values()) <= rule.LARGEST_SHARE * found.hidden

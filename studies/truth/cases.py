@@ -1,6 +1,6 @@
 """Drawn cases kept in a file: the misfit rule is dear, and a test wants the same case every time.
 
-python -m studies.truth.cases --seeds 1 2 3 -o studies/truth/cases.json
+python -m studies.truth.cases --plant servo_drive --seeds 1 2 3 -o studies/truth/cases.json
 
 draws every hidden effect, the law outside the catalogue and the case with nothing hidden, and
 applies the misfit rule (a few minutes a seed).
@@ -12,10 +12,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 
-from studies.truth.draw import EFFECTS, Case, Difference, draw
-from studies.truth.misfit import scaled
+from studies.truth.case import Case, Difference
+from studies.truth.plants import SERVO_DRIVE, TRUTHS
 
-STORED = Path(__file__).with_name("cases.json")
+STORED = SERVO_DRIVE.stored
 
 
 def read_cases(path: Path = STORED) -> dict[tuple[str | None, int], Case]:
@@ -30,11 +30,6 @@ def write_cases(cases: Iterable[Case], path: Path) -> None:
     path.write_text(f"[\n{lines}\n]\n")
 
 
-def drawn_cases(seeds: Sequence[int]) -> list[Case]:
-    """All cases of these seeds under the misfit rule."""
-    return scaled([draw(hidden, seed) for seed in seeds for hidden in (*EFFECTS, None)])
-
-
 def _case(numbers: dict) -> Case:
     differences = tuple(Difference(**each) for each in numbers.pop("differences"))
     pairs = {key: tuple((k, v) for k, v in numbers.pop(key)) for key in ("accessories", "shrunk")}
@@ -44,10 +39,12 @@ def _case(numbers: dict) -> Case:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Draw and store; see the module."""
     parser = argparse.ArgumentParser(prog="python -m studies.truth.cases", description=__doc__)
+    parser.add_argument("--plant", choices=TRUTHS, default=SERVO_DRIVE.plant)
     parser.add_argument("--seeds", type=int, nargs="+", required=True)
-    parser.add_argument("-o", "--output", type=Path, default=STORED)
+    parser.add_argument("-o", "--output", type=Path, help="instead of the plant's stored cases")
     asked = parser.parse_args(arguments)
-    write_cases(drawn_cases(asked.seeds), asked.output)
+    truth = TRUTHS[asked.plant]
+    write_cases(truth.drawn_cases(asked.seeds), asked.output or truth.stored)
 
 
 if __name__ == "__main__":

@@ -3,28 +3,15 @@
 Source: physics.md 2.4 (nominal values), 6 (effects); the sizes are those of the test bench.
 """
 
-import zlib
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from studies.truth.case import Case, Difference, Hidden, generator
 from studies.truth.drive import Drive
 
 NOMINAL = Drive()
 TANK_M3 = 1e-3
-
-
-@dataclass(frozen=True)
-class Hidden:
-    """One effect that the detector has to find: its field, typical size, how it acts.
-
-    `signed`: the sign is drawn too. `replaces`: the size stands instead of the nominal value.
-    """
-
-    fields: tuple[str, ...]
-    typical: float
-    signed: bool = False
-    replaces: bool = False
 
 
 EFFECTS = {
@@ -52,37 +39,6 @@ HIDDEN = tuple(name for name in EFFECTS if name not in OUTSIDE_CATALOGUE)
 SMALLEST_SHARE, LARGEST_SHARE = 0.15, 0.60
 
 
-@dataclass(frozen=True)
-class Difference:
-    """One small deviation of the truth from the detector's model: field = nominal + change."""
-
-    field: str
-    change: float
-
-
-@dataclass(frozen=True)
-class Case:
-    """All drawn numbers of one recording pair.
-
-    `size` is the hidden size in SI (share of typical inside 0.15..0.6), 0 if nothing is hidden.
-    `accessories` are fields without effect of their own (wavelength, phase, valve damping, ...).
-    `shrunk` maps a field to the factor by which the misfit rule has reduced its difference.
-    """
-
-    hidden: str | None
-    seed: int
-    size: float
-    differences: tuple[Difference, ...]
-    accessories: tuple[tuple[str, float], ...]
-    shrunk: tuple[tuple[str, float], ...] = ()
-    redraws: int = 0
-
-    @property
-    def supply_recorded(self) -> bool:
-        """False if the supply pressure is not among the channels."""
-        return self.hidden != "supply_droop"
-
-
 def draw(hidden: str | None, seed: int) -> Case:
     """The case of this effect and seed, before the misfit rule (`misfit.scaled`).
 
@@ -94,19 +50,13 @@ def draw(hidden: str | None, seed: int) -> Case:
     return Case(hidden, seed, draw_size(hidden, rng), _differences(hidden, rng), _accessories(rng))
 
 
-def generator(hidden: str | None, seed: int, purpose: str) -> np.random.Generator:
-    """Random numbers that depend on case and purpose only, not on the batch."""
-    return np.random.default_rng([seed, zlib.crc32(f"{hidden}/{purpose}".encode())])
-
-
 def draw_size(hidden: str | None, rng: np.random.Generator) -> float:
     """Log-uniform in 15..60 % of typical; a law outside the catalogue gets the upper half."""
     if hidden is None:
         return 0.0
     effect = EFFECTS[hidden]
     low = 0.30 if hidden in OUTSIDE_CATALOGUE else SMALLEST_SHARE
-    share = np.exp(rng.uniform(np.log(low), np.log(LARGEST_SHARE)))
-    return float(effect.typical * share * (rng.choice([-1, 1]) if effect.signed else 1))
+    return effect.drawn_size(low, LARGEST_SHARE, rng)
 
 
 def _differences(hidden: str | None, rng: np.random.Generator) -> tuple[Difference, ...]:
@@ -167,19 +117,3 @@ def _hidden_fields(hidden: str, size: float) -> dict[str, float]:
     if hidden == "supply_droop":  # no droop is an infinite tank; a resistance of 0 divides
         return {"supply_resistance_pa_s_kg": size, "tank_per_m3": 1 / TANK_M3} if size else {}
     return {field: size for field in EFFECTS[hidden].fields}
-
-
-def resized(case: Case, size: float) -> Case:
-    """The same case with another hidden size (counts as a redraw)."""
-    return replace(case, size=size, redraws=case.redraws + 1)
-
-
-def shrink(case: Case, factors: dict[str, float]) -> Case:
-    """The case with some differences multiplied by factors, which are noted in `shrunk`."""
-    differences = tuple(
-        Difference(x.field, x.change * factors.get(x.field, 1.0)) for x in case.differences
-    )
-    noted = dict(case.shrunk)
-    for field, factor in factors.items():
-        noted[field] = noted.get(field, 1.0) * factor
-    return replace(case, differences=differences, shrunk=tuple(sorted(noted.items())))

@@ -1,4 +1,4 @@
-"""The rule that no small difference may hide the hidden effect.
+"""Misfits of the servo drive, for the rule that no small difference may hide the hidden effect.
 
 Windows of 0.5 s are replayed with the recorded command from the true state at their start, once
 as it was, once without the hidden effect, once without each difference.  The misfit is the mean
@@ -6,75 +6,27 @@ squared deviation of position and both pressures over the noise variance.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from studies.truth import drive as d
-from studies.truth.draw import Case, draw_size, drive_of, generator, resized, shrink
+from studies.truth import rule
+from studies.truth.case import Case, generator
+from studies.truth.draw import draw_size, drive_of
 from studies.truth.integrate import open_loop
 from studies.truth.manoeuvre import training_reference
+from studies.truth.rule import Misfit
 from studies.truth.run import POSITION_NOISE_M, PRESSURE_NOISE_PA, Run, closed_loop
 
 WINDOW_SAMPLES = 500
 STARTS = tuple(range(500, 9500, 1000))
-LARGEST_SHARE = 0.20
-VISIBLE = 1.0  # mean squared deviation over noise variance: as large as the noise
 REPLAY_SUBSTEPS = 25  # enough for differences of two replays
 LARGEST_BATCH = 2500  # columns; more does not fit the cache
 
 
-@dataclass(frozen=True)
-class Misfit:
-    """Misfit of the hidden effect and of each difference, in noise variances."""
-
-    hidden: float
-    differences: dict[str, float]
-
-
-def scaled(cases: Sequence[Case], rounds: int = 12) -> list[Case]:
-    """Cases whose hidden effect is visible and whose differences are each below 20 % of it.
-
-    An invisible hidden effect gets a new size; a difference that is too large is halved (misfit
-    goes about with the square of the amplitude).  Both change the path, so every changed case is
-    measured again until the rule holds.  Null cases are returned as they are.
-
-    Raises RuntimeError if the rule does not hold after `rounds` measurements.
-    """
-    done = list(cases)
-    todo = [i for i, case in enumerate(cases) if case.hidden]
-    for _ in range(rounds):
-        found = misfits([done[i] for i in todo])
-        again = []
-        for i, misfit in zip(todo, found, strict=True):
-            better = corrected(done[i], misfit)
-            if better != done[i]:
-                done[i] = better
-                again.append(i)
-        todo = again
-        if not todo:
-            return done
-    names = ", ".join(f"{done[i].hidden} seed {done[i].seed}" for i in todo)
-    raise RuntimeError(f"truth: {names} do not meet the misfit rule after {rounds} rounds")
-
-
-def corrected(case: Case, misfit: Misfit) -> Case:
-    """The case with a new size or smaller differences; the same case if it meets the rule."""
-    if misfit.hidden < VISIBLE:
-        rng = generator(case.hidden, case.seed, f"size {case.redraws}")
-        return resized(case, draw_size(case.hidden, rng))
-    factors = halvings(misfit)
-    return shrink(case, factors) if factors else case
-
-
-def halvings(misfit: Misfit) -> dict[str, float]:
-    """Factors (powers of a half) of the differences that exceed their share."""
-    factors = {}
-    for field, value in misfit.differences.items():
-        excess = value / max(LARGEST_SHARE * misfit.hidden, 1e-30)
-        if excess > 1:
-            factors[field] = 0.5 ** int(np.ceil(np.log(excess) / np.log(4)))
-    return factors
+def scaled(cases: Sequence[Case], rounds: int = rule.ROUNDS) -> list[Case]:
+    """Cases that meet the rule, see `rule.scaled`."""
+    return rule.scaled(cases, misfits, draw_size, rounds)
 
 
 def misfits(cases: Sequence[Case]) -> list[Misfit]:

@@ -11,7 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from studies.truth.draw import EFFECTS, HIDDEN, Case, draw, drive_of, generator
+from studies.truth.case import Case, generator
+from studies.truth.draw import EFFECTS, HIDDEN, draw, drive_of
 from studies.truth.manoeuvre import training_reference, validation_reference
 from studies.truth.misfit import scaled
 from studies.truth.run import Run, closed_loop

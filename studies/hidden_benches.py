@@ -1,0 +1,95 @@
+"""The plants of study ``hidden-effects``: how a truth's tables and names read in the catalogue.
+
+A new plant is its truth (``studies/truth/plants.py``) and one ``Bench`` here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from studies.truth.case import Case
+from studies.truth.plants import SERVO_DRIVE as SERVO_DRIVE_TRUTH
+from studies.truth.plants import Truth
+from workbench.recording import Recording
+from workbench.rig import Rig, default_rig
+
+
+@dataclass(frozen=True)
+class Bench:
+    """One plant of the study.
+
+    Attributes
+    ----------
+    truth
+        What records the cases.
+    channels
+        Signal and factor to SI of each column of a recorded table.
+    always_there
+        Small differences that every truth has and the catalogue can name: naming one of them where
+        nothing is hidden is right.
+    places
+        Catalogue's name of a hidden effect where it is not the truth's.
+    sample_time_s
+        Of the recorded tables.
+    """
+
+    truth: Truth
+    channels: Mapping[str, tuple[str, float]]
+    always_there: tuple[str, ...]
+    places: Mapping[str, str] = field(default_factory=dict)
+    sample_time_s: float = 1e-3
+
+    @property
+    def plant(self) -> str:
+        """The plant's name in the workbench, and in the cases."""
+        return self.truth.plant
+
+    def public_name(self, case: Case) -> str | None:
+        """The hidden effect as the catalogue names it; None where it is not in there."""
+        if case.hidden not in self.truth.hidden:
+            return None
+        return self.places.get(case.hidden, case.hidden)
+
+    def user_rig(self, case: Case) -> Rig:
+        """The rig of a user who does not know of the hidden effect."""
+        rig = default_rig(self.plant)
+        name = self.public_name(case)
+        if name is None:
+            return rig
+        candidate = rig.plant.candidates[name]
+        return replace(rig, plant=rig.plant.at_null(candidate), removed=(name,))
+
+    def recording(self, table: Mapping[str, np.ndarray], name: str) -> Recording:
+        """A recorded table in SI units and the plant's signals."""
+        channels = {
+            public: np.asarray(table[column]) * factor
+            for column, (public, factor) in self.channels.items()
+            if column in table
+        }
+        return Recording(name, self.sample_time_s, channels, source="studies/truth")
+
+
+SERVO_DRIVE = Bench(
+    truth=SERVO_DRIVE_TRUTH,
+    channels={
+        "command_V": ("valve.command_v", 1.0),
+        "position_mm": ("slide.position_m", 1e-3),
+        "pressure_a_bar": ("chamber_a.pressure_pa", 1e5),
+        "pressure_b_bar": ("chamber_b.pressure_pa", 1e5),
+        "supply_bar": ("supply.pressure_pa", 1e5),
+    },
+    always_there=("valve_lag", "command_delay", "sensor_lag", "friction_position"),
+    places={
+        "chamber_leak": "chamber_leak@chamber_a",
+        "sensor_offset": "sensor_offset@chamber_a.pressure",
+    },
+)
+BENCHES = {bench.plant: bench for bench in (SERVO_DRIVE,)}
+
+
+def bench_of(case: Case) -> Bench:
+    """The bench of a case's plant."""
+    return BENCHES[case.plant]

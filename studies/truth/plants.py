@@ -1,0 +1,62 @@
+"""The plants that have a truth, each with what a study asks of it; a new one is one entry here."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from studies.truth import draw, misfit, record, rule
+from studies.truth.case import Case
+
+Table = Mapping[str, np.ndarray]
+
+
+@dataclass(frozen=True)
+class Truth:
+    """The truth of one plant.
+
+    plant               name of the plant, as cases carry it
+    hidden              effects of the catalogue that a case may hide, by the truth's names
+    outside_catalogue   laws that no catalogue has
+    stored              file of the drawn cases
+    draw                case of an effect (None for nothing hidden) and seed, before the misfit rule
+    draw_size           size of an effect
+    misfits             misfit of the hidden effect and of every difference
+    record              training and validation table of each case
+    """
+
+    plant: str
+    hidden: tuple[str, ...]
+    outside_catalogue: tuple[str, ...]
+    stored: Path
+    draw: Callable[[str | None, int], Case]
+    draw_size: rule.DrawSize
+    misfits: rule.Measure
+    record: Callable[[Sequence[Case]], list[tuple[Table, Table]]]
+
+    def scaled(self, cases: Sequence[Case]) -> list[Case]:
+        """Cases that meet the misfit rule."""
+        return rule.scaled(cases, self.misfits, self.draw_size)
+
+    def drawn_cases(self, seeds: Sequence[int]) -> list[Case]:
+        """All cases of these seeds under the misfit rule."""
+        names = (*self.hidden, *self.outside_catalogue, None)
+        return self.scaled([self.draw(hidden, seed) for seed in seeds for hidden in names])
+
+
+def _stored(name: str) -> Path:
+    return Path(__file__).with_name(name)
+
+
+SERVO_DRIVE = Truth(
+    plant="servo_drive",
+    hidden=draw.HIDDEN,
+    outside_catalogue=draw.OUTSIDE_CATALOGUE,
+    stored=_stored("cases.json"),
+    draw=draw.draw,
+    draw_size=draw.draw_size,
+    misfits=misfit.misfits,
+    record=record.record,
+)
+TRUTHS = {truth.plant: truth for truth in (SERVO_DRIVE,)}
