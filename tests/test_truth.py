@@ -11,6 +11,7 @@ import pytest
 from studies.truth import draw as draws
 from studies.truth import drive as d
 from studies.truth import misfit, restriction, rule
+from studies.truth.batch import stack
 from studies.truth.case import shrink
 from studies.truth.integrate import open_loop
 from studies.truth.manoeuvre import training_reference, validation_reference
@@ -26,7 +27,7 @@ def sine(samples: int) -> np.ndarray:
 
 
 def run(drive: d.Drive, command, position_m=0.03, pressure_pa=5.65e5, **keywords):
-    batch = d.stack([drive])
+    batch = stack([drive])
     return open_loop(batch, command, d.at_rest(batch, position_m, pressure_pa), **keywords)
 
 
@@ -136,7 +137,7 @@ def test_a_closed_adiabatic_chamber_keeps_its_mass_and_its_isentrope():
 
 def test_a_piston_leak_moves_gas_and_loses_none():
     leaking = replace(SHUT, piston_leak_m2=2e-6)
-    batch = d.stack([leaking])
+    batch = stack([leaking])
     start = d.at_rest(batch, 0.145, np.array([[6e5], [5.3e5]]))
     out = open_loop(batch, np.full(300, 4.95), start)
     a, b = mass(leaking, out, "a")[:, 0], mass(leaking, out, "b")[:, 0]

@@ -1,11 +1,13 @@
 """Constants and buffers of a batch of true drives: all that does not change from step to step."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from types import SimpleNamespace
 
 import numpy as np
 
 from studies.truth import drive as d
+from studies.truth.batch import spread
+from studies.truth.instruments import sensor_weights, spool_response
 
 SAMPLE_TIME_S = 1e-3
 SUBSTEPS = 50
@@ -26,17 +28,16 @@ def bench(drive: d.Drive, substeps: int = SUBSTEPS) -> Bench:
     """Prepare a batch (fields of shape (n_columns,)) for `advance`."""
     step_s = SAMPLE_TIME_S / substeps
     n = d.columns(drive)
-    drive = d.Drive(
-        **{
-            f.name: np.broadcast_to(getattr(drive, f.name), (n,)).astype(float)
-            for f in fields(d.Drive)
-        }
-    )
+    drive = spread(drive, n)
+    spool, valve = spool_response(drive, step_s, substeps)
+    keep, weight = sensor_weights(drive.pressure_lag_s, step_s, substeps)
     constant = SimpleNamespace(
         **_chamber_constants(drive, step_s),
         **_mechanics_constants(drive, step_s),
-        **_valve_response(drive, step_s, substeps),
-        **_sensor_weights(drive, step_s, substeps),
+        spool_response=spool,
+        valve_response=valve,
+        read_keep=keep,
+        read_weight=weight,
     )
     return Bench(drive, step_s, substeps, constant, _buffers(drive, substeps))
 
@@ -74,36 +75,6 @@ def _mechanics_constants(p: d.Drive, step_s: float) -> dict:
         damp=d.BRISTLE_DAMPING_N_S_M / step_s,
         presliding_gain=1 / (1 - p.presliding_share),
     )
-
-
-def _valve_response(p: d.Drive, step_s: float, substeps: int) -> dict:
-    """Spool at each substep and state after the last, as sums over (state, command).
-
-    The valve is linear and the command constant over a sample, so unit responses suffice.
-    """
-    period = p.valve_period_s / (2 * np.pi * step_s)
-    lag = 1 - np.exp(-step_s / np.maximum(p.valve_lag_s, 1e-12))
-    n = len(lag)
-    state = np.zeros((3, 4, n))
-    state[[0, 1, 2], [0, 1, 2]] = 1.0
-    command = np.zeros((4, n))
-    command[3] = 1.0
-    spool = np.empty((substeps, 4, n))
-    for j in range(substeps):
-        lagged = state[0] + lag * (command - state[0])
-        move = (period**2 * state[2] + lagged - state[1]) / (
-            period**2 + 2 * p.valve_damping * period + 1
-        )
-        state = np.stack([lagged, state[1] + move, move])
-        spool[j] = state[1]
-    return dict(spool_response=spool, valve_response=state)
-
-
-def _sensor_weights(p: d.Drive, step_s: float, substeps: int) -> dict:
-    """First-order lag of the pressure readings, as weights over the substeps of one sample."""
-    keep = np.exp(-step_s / np.maximum(p.pressure_lag_s, 1e-12))
-    powers = keep ** np.arange(substeps - 1, -1, -1)[:, None]
-    return dict(read_keep=keep**substeps, read_weight=((1 - keep) * powers)[:, None, :])
 
 
 def _buffers(p: d.Drive, substeps: int) -> SimpleNamespace:

@@ -6,8 +6,7 @@ The same class holds one drive (floats) or a batch of drives (arrays of shape (n
 Source: physics.md section 2.4 (paper 002, tables 5 and 6, with the errata of section 3).
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -99,13 +98,6 @@ class State:
     read_pa: np.ndarray
 
 
-def stack(drives: Sequence[Drive]) -> Drive:
-    """Many drives as one batch: every field becomes an array of shape (n_columns,)."""
-    return Drive(
-        **{f.name: np.array([getattr(d, f.name) for d in drives], float) for f in fields(Drive)}
-    )
-
-
 def columns(drive: Drive) -> int:
     """Number of columns in a batch."""
     return len(np.atleast_1d(drive.moving_mass_kg))
@@ -127,19 +119,4 @@ def at_rest(drive: Drive, position_m, pressure_pa=5.65e5, command_v: float = 4.9
         supply_pa=np.broadcast_to(drive.supply_pressure_pa, (n,)).astype(float),
         valve=np.stack([volt, volt, np.zeros(n)]),
         read_pa=pressure.copy(),
-    )
-
-
-def take(state: State, column) -> State:
-    """Columns of a state, by index array; repeats are allowed."""
-    return State(**{f.name: getattr(state, f.name)[..., column].copy() for f in fields(State)})
-
-
-def join(states: Sequence[State]) -> State:
-    """Batches side by side."""
-    return State(
-        **{
-            f.name: np.concatenate([getattr(s, f.name) for s in states], axis=-1)
-            for f in fields(State)
-        }
     )

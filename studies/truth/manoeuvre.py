@@ -9,6 +9,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from studies.truth.movement import move, time_s
+
 SAMPLES = 10_000
 START_M = 0.060
 LOW_M, HIGH_M = 0.038, 0.248
@@ -18,40 +20,29 @@ TRAVEL_SPEED_M_S = 0.9
 def training_reference(rng: np.random.Generator) -> np.ndarray:
     """Random steps with rests (6.4 s), ramp at 25..50 mm/s (0.8 s), multi-tone (2.8 s)."""
     steps = _steps(rng, 6400)
-    ramp = steps[-1] + np.sign(0.145 - steps[-1]) * rng.uniform(0.025, 0.05) * _time(800)
+    ramp = steps[-1] + np.sign(0.145 - steps[-1]) * rng.uniform(0.025, 0.05) * time_s(800)
     return _clip(np.concatenate([steps, ramp, _multi_tone(rng, ramp[-1], 2800)]))
 
 
 def validation_reference(rng: np.random.Generator) -> np.ndarray:
     """Hold, slow triangle, hold, fast move, falling-amplitude sine sweep, hold, creep."""
     slope = rng.uniform(0.04, 0.07)
-    rise = START_M + slope * np.minimum(_time(2200), 2.2 - _time(2200)).clip(0)
+    rise = START_M + slope * np.minimum(time_s(2200), 2.2 - time_s(2200)).clip(0)
     parts = [
         np.full(800, START_M),
         rise,
         np.full(600, rise[-1]),
-        _move(rise[-1], rng.uniform(0.235, HIGH_M), 900),
+        move(rise[-1], rng.uniform(0.235, HIGH_M), 900, TRAVEL_SPEED_M_S),
     ]
     parts.append(_sweep(rng, parts[-1][-1], 3600))
-    parts.append(_move(parts[-1][-1], rng.uniform(LOW_M, 0.08), 1000))
+    parts.append(move(parts[-1][-1], rng.uniform(LOW_M, 0.08), 1000, TRAVEL_SPEED_M_S))
     last = parts[-1][-1]
-    parts.append(last + rng.uniform(0.02, 0.05) * _time(SAMPLES - sum(map(len, parts))))
+    parts.append(last + rng.uniform(0.02, 0.05) * time_s(SAMPLES - sum(map(len, parts))))
     return _clip(np.concatenate(parts))
-
-
-def _time(samples: int) -> np.ndarray:
-    return np.arange(samples) * 1e-3
 
 
 def _clip(reference: np.ndarray) -> np.ndarray:
     return np.clip(reference, LOW_M - 0.005, HIGH_M + 0.005)
-
-
-def _move(start: float, stop: float, samples: int, speed: float = TRAVEL_SPEED_M_S) -> np.ndarray:
-    """Half-cosine move with the given top speed, then rest."""
-    duration = max(np.pi / 2 * abs(stop - start) / speed, 0.05)
-    phase = np.minimum(_time(samples) / duration, 1.0)
-    return start + (stop - start) * 0.5 * (1 - np.cos(np.pi * phase))
 
 
 def _steps(rng: np.random.Generator, samples: int) -> np.ndarray:
@@ -64,30 +55,30 @@ def _steps(rng: np.random.Generator, samples: int) -> np.ndarray:
         lengths.append(int(rng.uniform(500, 1000)))
     parts, last = [np.full(100, START_M)], START_M
     for target, length in zip(targets, lengths, strict=True):
-        parts.append(_move(last, target, length, speed=rng.uniform(0.5, 1.1)))
+        parts.append(move(last, target, length, speed=rng.uniform(0.5, 1.1)))
         last = parts[-1][-1]
     return np.concatenate(parts)[:samples]
 
 
 def _multi_tone(rng: np.random.Generator, start: float, samples: int) -> np.ndarray:
     """Four tones of 0.4..3 Hz around mid-stroke, faded in, with at most 0.8 m/s together."""
-    t = _time(samples)
+    t = time_s(samples)
     frequency = np.array([0.45, 0.9, 1.7, 2.9]) * rng.uniform(0.9, 1.1, 4)
     speed = np.array([0.25, 0.25, 0.2, 0.1]) * rng.uniform(0.8, 1.1, 4)
     phase = rng.uniform(0, 2 * np.pi, 4)
     tones = speed / (2 * np.pi * frequency) * np.sin(2 * np.pi * frequency * t[:, None] + phase)
-    fade = _move(0.0, 1.0, samples, speed=3.5)
+    fade = move(0.0, 1.0, samples, speed=3.5)
     return start + (0.145 - start) * fade + fade * tones.sum(axis=1)
 
 
 def _sweep(rng: np.random.Generator, start: float, samples: int) -> np.ndarray:
     """Sine from 0.4 to about 2.5 Hz with falling amplitude, faded in from the start position."""
-    t = _time(samples)
+    t = time_s(samples)
     low, high = 0.4 * rng.uniform(0.9, 1.1), 2.5 * rng.uniform(0.9, 1.1)
     span = t[-1]
     phase = 2 * np.pi * low * span / np.log(high / low) * ((high / low) ** (t / span) - 1)
     amplitude = 0.095 * (low / high) ** (0.75 * t / span)
-    fade = _move(0.0, 1.0, samples, speed=3.0)
+    fade = move(0.0, 1.0, samples, speed=3.0)
     return start + fade * (0.145 + amplitude * np.cos(phase) - start)
 
 

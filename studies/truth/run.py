@@ -6,6 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from studies.truth import drive as d
+from studies.truth.batch import stack
+from studies.truth.instruments import quantised
 from studies.truth.integrate import advance, bench, observed
 from studies.truth.manoeuvre import START_M, Loop, loop_command, start_loop
 
@@ -35,7 +37,7 @@ def closed_loop(
     keep_states: Sequence[int] = (),
 ) -> Run:
     """Follow references of shape (n_samples, n_columns), after 0.3 s of unrecorded settling."""
-    prepared = bench(d.stack(drives))
+    prepared = bench(stack(drives))
     lead = np.repeat(references_m[:1], SETTLING_SAMPLES, axis=0)
     reference = np.concatenate([lead, references_m])
     speed = np.gradient(reference, 1e-3, axis=0)
@@ -50,7 +52,7 @@ def closed_loop(
         seen = observed(p, state)
         reading = _read(seen, noise[k])
         command = loop_command(loop, memory, reference[k], speed[k], reading["position_m"])
-        reading["command_v"] = _quantised(command, COMMAND_STEP_V)
+        reading["command_v"] = quantised(command, COMMAND_STEP_V)
         readings.append(reading)
         truths.append(seen)
         if k - SETTLING_SAMPLES in keep_states:
@@ -67,11 +69,7 @@ def _columns(rows: list[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
 def _read(seen: dict[str, np.ndarray], noise: np.ndarray) -> dict[str, np.ndarray]:
     """Noise, then quantisation."""
     position = seen["position_m"] + POSITION_NOISE_M * noise[0]
-    reading = dict(position_m=_quantised(position, POSITION_STEP_M))
+    reading = dict(position_m=quantised(position, POSITION_STEP_M))
     for row, name in enumerate(("pressure_a_pa", "pressure_b_pa", "supply_pa"), start=1):
-        reading[name] = _quantised(seen[name] + PRESSURE_NOISE_PA * noise[row], PRESSURE_STEP_PA)
+        reading[name] = quantised(seen[name] + PRESSURE_NOISE_PA * noise[row], PRESSURE_STEP_PA)
     return reading
-
-
-def _quantised(value: np.ndarray, step: float) -> np.ndarray:
-    return step * np.round(value / step)
