@@ -137,6 +137,7 @@ def _ranked(row: Ranked) -> Document:
         "error_drop_validation": plain(row.drop_validation),
         "tied_with": list(row.tied_with),
         "compensable": plain(row.compensable),
+        "visible_from": plain(row.visible_from),
         "decided_by": row.decided_by.value,
         "accepted": row.accepted,
         "reasons": list(row.reasons),

@@ -119,7 +119,14 @@ def sizes_text(row: Ranked) -> str:
 def _remark(row: Ranked) -> str:
     if row.accepted:
         return f"accepted, tied with {', '.join(row.tied_with)}" if row.tied_with else "accepted"
-    return "; ".join(row.reasons)
+    return "; ".join((*row.reasons, *([_blind_text(row)] if row.blind else [])))
+
+
+def _blind_text(row: Ranked) -> str:
+    """From which size this recording would show a candidate that it hardly shows."""
+    if not isfinite(row.visible_from):
+        return "this recording cannot show it"
+    return f"seen here from {number(row.visible_from, 2)} times its typical size"
 
 
 def where_text(found: Diagnosis) -> str:

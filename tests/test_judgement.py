@@ -13,6 +13,7 @@ from workbench.diagnosis.judge import SHARE_REASON, reasons_against, tie_group
 from workbench.diagnosis.ranking import ranked
 from workbench.diagnosis.result import Size, Verdict
 from workbench.diagnosis.shifts import shifts
+from workbench.diagnosis.verdict import judged, sentence
 from workbench.fitting.error_model import error_model
 from workbench.fitting.fit import fit
 from workbench.fitting.problem import pose, split, window_length_s
@@ -31,7 +32,7 @@ def problem():
 
 @pytest.fixture(scope="module")
 def followed(problem):
-    return _followed(problem, silent)
+    return _followed(problem, None, silent)
 
 
 @pytest.fixture(scope="module")
@@ -70,6 +71,20 @@ def test_those_that_pass_come_before_a_tie_is_cut_to_three(problem, followed, so
 
     assert len(group) == 3
     assert group[0].candidate == sound.candidate
+
+
+def test_four_that_cannot_be_told_apart_are_no_tie_but_a_recording_too_weak(
+    problem, followed, sound
+):
+    alike = [named(sound, followed, k) for k in range(3)]
+    rows = ranked(problem, followed.profiles, [sound, *alike], [], {})
+
+    assert len(rows[0].tied_with) == 2
+    assert len(rows[0].crowd) == 1
+    assert judged(rows, None, True, ()) is Verdict.RECORDING_TOO_WEAK
+    assert rows[0].crowd[0] in sentence(Verdict.RECORDING_TOO_WEAK, rows, None)
+    three = ranked(problem, followed.profiles, [sound, *alike[:2]], [], {})
+    assert judged(three, None, True, ()) is Verdict.TIE
 
 
 def test_an_accepted_row_leads_one_that_fails_a_criterion(problem, followed, sound):

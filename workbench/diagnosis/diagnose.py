@@ -10,8 +10,9 @@ Source: diagnosis.md 1.2 to 1.9.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from workbench.comparison.regimes import regime_shares
 from workbench.diagnosis.judge import (
     CLEARLY_LESS,
     LEAST_TRAINING,
@@ -22,14 +23,14 @@ from workbench.diagnosis.judge import (
 from workbench.diagnosis.law import empirical_law
 from workbench.diagnosis.ranking import ranked
 from workbench.diagnosis.refit import Refit, refit, refit_shift
-from workbench.diagnosis.result import NAMING, Diagnosis, Law, Ranked, Verdict
+from workbench.diagnosis.result import NAMING, Diagnosis, Law, Ranked, Where
 from workbench.diagnosis.rough import rough_fit
 from workbench.diagnosis.scan import Profile, scan
 from workbench.diagnosis.shifts import Shift, shifts
-from workbench.diagnosis.where import locate
+from workbench.diagnosis.verdict import far_above_noise, judged, sentence, unexplained
+from workbench.diagnosis.where import acts_in, locate
 from workbench.effect import Kind
 from workbench.fitting.errors import errors_of
-from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.problem import Problem, improved_base, pose, split
 from workbench.fitting.windows import MOST_WINDOWS
 from workbench.recording import Recording, same_data
@@ -41,9 +42,8 @@ REFITTED = 5  # of those, at the most
 WORTH_A_REFIT = 0.4  # of the best share of the first fits
 SHIFTS_REFITTED = 2  # parameters that leave their priors
 WORTH_A_SHIFT = 0.25  # of the best refit
+LOCATED = 2  # candidates that are followed because they act where the smoother finds a lack
 CERTAIN_SHARE = 0.5  # an accepted candidate above it needs no comparison with an empirical law
-
-FAR_ABOVE_NOISE = 3.0  # RMSE over noise that is worth a word where nothing is named
 
 WEAK_EVIDENCE = "no validation recording: the last third is held out, which is weak evidence"
 
@@ -85,27 +85,29 @@ def diagnose(
     problem = pose(rig, train, validation, most_windows)
     if not problem.base.converged:
         warnings += ("the prior fit did not converge: the ranking is provisional",)
-    found = _followed(problem, progress)
+    progress("where it fails")
+    where = locate(problem, train)
+    found = _followed(problem, where, progress)
     better = improved_base(problem, [each.fit for each in found.refits])
     if better:
         progress("the prior fit is improved by what the refits found: once more")
         problem = better
-        found = _followed(problem, progress)
+        where = where and replace(where, by_regime=regime_shares(problem.base))
+        found = _followed(problem, where, progress)
     profiles, refits, moved = found.profiles, found.refits, found.moved
     ranking = ranked(problem, profiles, refits, moved, found.begun)
-    progress("where it fails")
-    where = locate(problem, train)
     law = _law(problem, ranking, profiles, progress)
-    verdict = _verdict(ranking, law, held_out)
+    far = far_above_noise(problem.base_validation)
+    verdict = judged(ranking, law, held_out, far)
     best = ranking[0] if verdict in NAMING else None
     if best and best.fit and not best.fit.converged:
         warnings += (f"the refit with {best.candidate.name} did not converge: its size may be off",)
     after = (law.fit, law.validation) if law else (best and best.fit, best and best.validation)
-    warnings += _unexplained(after[1] or problem.base_validation, verdict)
+    warnings += unexplained(far, verdict)
     return Diagnosis(
         rig_name=rig.name,
         verdict=verdict,
-        sentence=_sentence(verdict, ranking, law),
+        sentence=sentence(verdict, ranking, law),
         ranking=ranking,
         where=where,
         before=errors_of(problem.base, problem.base_validation),
@@ -127,11 +129,11 @@ class _Followed:
     moved: list[Shift]
 
 
-def _followed(problem: Problem, progress: Progress) -> _Followed:
+def _followed(problem: Problem, where: Where | None, progress: Progress) -> _Followed:
     """Scan the catalogue and refit the best few."""
     progress("scan of the catalogue")
     profiles = _scanned(problem)
-    looked = [p for p in profiles[:FITTED_FIRST] if p.drop > WORTH_A_LOOK * profiles[0].drop]
+    looked = _shortlist(profiles, where)
     progress(f"first fits of {len(looked)} candidates")
     begun = sorted((rough_fit(problem, p) for p in looked), key=lambda each: -each.share)
     refits: list[Refit] = []
@@ -151,6 +153,18 @@ def _followed(problem: Problem, progress: Progress) -> _Followed:
     refits.sort(key=lambda r: (bool(against[id(r)]), not predicts(r), -r.drop_train))
     shares = {each.profile.candidate.name: each.share for each in begun}
     return _Followed(profiles, shares, refits, moved)
+
+
+def _shortlist(profiles: list[Profile], where: Where | None) -> list[Profile]:
+    """The best of the scan, and the best of those that act in the balance that lacks something.
+
+    The two fail on different effects (diagnosis.md 4.1).
+    """
+    best = [p for p in profiles[:FITTED_FIRST] if p.drop > WORTH_A_LOOK * profiles[0].drop]
+    if where is None:
+        return best
+    there = [p for p in profiles if p.drop > 0.0 and acts_in(p.candidate, where.balance)]
+    return best + [p for p in there[:LOCATED] if p not in best]
 
 
 def _best_share(refits: list[Refit]) -> float:
@@ -197,46 +211,3 @@ def _law(
     )
     left = min((1.0 - CLEARLY_LESS) * (1.0 - effect), 1.0 - shift)
     return law if law and 1.0 - law.drop_train < left else None
-
-
-def _verdict(ranking: tuple[Ranked, ...], law: Law | None, held_out: bool) -> Verdict:
-    """The verdict of interface.md section 4."""
-    if law:
-        return Verdict.NOT_IN_CATALOGUE
-    leader = ranking[0] if ranking else None
-    if leader and leader.accepted:
-        return Verdict.TIE if leader.tied_with or not held_out else Verdict.FOUND
-    if leader and leader.reasons == (SHARE_REASON,):
-        return Verdict.SMALL_PROXY
-    return Verdict.NOTHING_MISSING
-
-
-def _unexplained(held_out: Fit | None, verdict: Verdict) -> tuple[str, ...]:
-    """A warning where nothing is named and the error stays far above the noise all the same."""
-    if held_out is None or verdict in NAMING or verdict is Verdict.NOT_IN_CATALOGUE:
-        return ()
-    far = [
-        f"{name} {error.rmse / error.noise:.0f} times its noise"
-        for name, error in errors_of(held_out, None)["train"].items()
-        if error.rmse > FAR_ABOVE_NOISE * error.noise
-    ]
-    return (f"unexplained errors remain on held-out windows: {', '.join(far)}",) if far else ()
-
-
-def _sentence(verdict: Verdict, ranking: tuple[Ranked, ...], law: Law | None) -> str:
-    """The verdict in words."""
-    leader = ranking[0] if ranking else None
-    name = leader.candidate.name if leader else ""
-    share = f"{leader.drop_train:.0%}" if leader else ""
-    if verdict is Verdict.FOUND:
-        return f"{name} is missing: it removes {share} of the misfit beyond noise"
-    if verdict is Verdict.TIE:
-        if not leader or not leader.tied_with:
-            return f"{name} ({share} of the misfit), on no more than one recording"
-        others = ", ".join(leader.tied_with)
-        return f"{name} ({share} of the misfit), not to be told here from {others}"
-    if verdict is Verdict.SMALL_PROXY:
-        return f"{name} explains {share} of the misfit and may stand for something else"
-    if verdict is Verdict.NOT_IN_CATALOGUE and law:
-        return f"nothing in the catalogue: {law.text} (empirical, not a physical effect)"
-    return "nothing in the catalogue earns its place"

@@ -72,12 +72,12 @@ def _share(refit: Refit) -> float:
 
 
 def _bic_gain(base: Fit, fit: Fit, parameters: int) -> float:
-    effective = max(float(_effective_samples(base)), 2.0)
+    effective = max(effective_samples(base), 2.0)
     spread = max(fit.chi2 / effective, 1e-12)
     return (base.cost - fit.cost) / spread - parameters * log(effective)
 
 
-def _effective_samples(fit: Fit) -> float:
+def effective_samples(fit: Fit) -> float:
     """Recorded values over the correlation times of their errors."""
     windows = fit.windows
     recorded = (windows.weight > 0).sum(axis=2)
@@ -104,7 +104,7 @@ def _size_reasons(refit: Refit) -> list[str]:
 
 
 def tie_group(base: Fit, refits: list[Refit], profiles: dict[str, Profile]) -> list[Refit]:
-    """The leader and those that cannot be told from it, the leader first, at most three.
+    """The leader and those that cannot be told from it, the leader first.
 
     A candidate is tied when its drop comes within a quarter of the best, or within half of it with
     a signature in the same direction: then only the nuisances decide between the two.  Among the
@@ -122,8 +122,8 @@ def tie_group(base: Fit, refits: list[Refit], profiles: dict[str, Profile]) -> l
         if gap < CLOSE_DROP or (cosine > SAME_DIRECTION and gap < CLOSE_DROP_SAME):
             tied.append(other)
     tied.sort(key=lambda each: bool(reasons_against(base, each)))
-    tied = tied[:LARGEST_TIE]
-    sound = [each for each in tied if not reasons_against(base, each)] or tied
+    sound = [each for each in tied if not reasons_against(base, each)] or tied[:LARGEST_TIE]
+    tied = tied[: max(len(sound), LARGEST_TIE)]
     effects = [each for each in sound if each.candidate.name in profiles] or sound
     best, leader = effects[0], min(effects, key=_left_held_out)
     if not _left_held_out(leader) < (1.0 - CLEARLY_LESS) * _left_held_out(best):

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
-from workbench.diagnosis.judge import HELD_OUT_REASON, reasons_against, tie_group
+from workbench.diagnosis.judge import HELD_OUT_REASON, LARGEST_TIE, reasons_against, tie_group
+from workbench.diagnosis.power import visible_from
 from workbench.diagnosis.refit import Refit
 from workbench.diagnosis.result import DecidedBy, Ranked
 from workbench.diagnosis.scan import Profile
@@ -28,10 +30,13 @@ def ranked(
     """
     by_name = {profile.candidate.name: profile for profile in profiles}
     group = tie_group(problem.base, refits, by_name) if refits else []
-    names = [each.candidate.name for each in group]
+    together = [each.candidate.name for each in group]
+    names, crowd = together[:LARGEST_TIE], tuple(together[LARGEST_TIE:])
     tied = {name: tuple(n for n in names if n != name) for name in names}
     rows = {r.candidate.name: _refitted(problem, r, by_name, tied) for r in refits}
-    order = [*names, *(name for name in rows if name not in names)]
+    if crowd:
+        rows[names[0]] = replace(rows[names[0]], crowd=crowd)
+    order = [*together, *(name for name in rows if name not in together)]
     followed = [rows[name] for name in order if predicts_row(rows[name])]
     refused = [rows[name] for name in order if not predicts_row(rows[name])]
     rest = [_shifted(shift) for shift in moved if shift.candidate.name not in rows]
@@ -94,6 +99,7 @@ def _refitted(
         decided_by=DecidedBy.REFIT,
         accepted=not against,
         reasons=against,
+        visible_from=visible_from(problem, profile) if profile else float("nan"),
         fit=each.fit,
         validation=each.validation,
     )
@@ -134,4 +140,5 @@ def _scanned_row(problem: Problem, profile: Profile, begun: Mapping[str, float])
         decided_by=DecidedBy.SCAN,
         accepted=False,
         reasons=(reason,),
+        visible_from=visible_from(problem, profile),
     )

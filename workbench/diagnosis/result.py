@@ -22,8 +22,10 @@ class Verdict(Enum):
     TIE = "tie"
     NOTHING_MISSING = "nothing_missing"
     NOT_IN_CATALOGUE = "not_in_catalogue"
+    RECORDING_TOO_WEAK = "recording_too_weak"
 
 
+BLIND = 1.0  # typical sizes: what is not seen there is not seen
 NAMING = (Verdict.FOUND, Verdict.TIE, Verdict.SMALL_PROXY)
 
 
@@ -60,6 +62,10 @@ class Ranked:
         Share of its effect on this recording that the fitted parameters can imitate.
     accepted, reasons
         Whether it passes every criterion of diagnosis.md 1.6, and why not in words.
+    visible_from
+        Size in typical sizes from which this recording would show it; NaN where that is not known.
+    crowd
+        Of the leader: those beyond the printed tie that cannot be told apart from it either.
     fit, validation
         The refit and the same plant on the held-out recordings; None where it was not followed.
     """
@@ -74,8 +80,15 @@ class Ranked:
     decided_by: DecidedBy
     accepted: bool
     reasons: tuple[str, ...]
+    visible_from: float = float("nan")
+    crowd: tuple[str, ...] = ()
     fit: Fit | None = field(default=None, repr=False)
     validation: Fit | None = field(default=None, repr=False)
+
+    @property
+    def blind(self) -> bool:
+        """True where the recording would not show the candidate in its typical size."""
+        return self.visible_from > BLIND
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,7 @@ from itertools import product
 
 import numpy as np
 
+from workbench.effect import Parameter
 from workbench.fitting.linearised import Linearised, Normal, Point, linearise, normal_equations
 from workbench.fitting.problem import staged
 from workbench.fitting.start_states import carried
@@ -42,13 +43,17 @@ class Trial:
     """One size, and shape, of one candidate.
 
     values      parameter values that put the candidate into the plant
+    size        its strength off its null, in typical sizes without sign
     drop        fall of the projected cost against the model without it
+    shown       what it adds to the projected cost of a model that is right without it
     nuisance    linear step of the scaled unknowns that goes with it, shape (n_p,)
     """
 
     candidate: Candidate
     values: Mapping[str, float]
+    size: float
     drop: float
+    shown: float
     nuisance: np.ndarray
 
 
@@ -109,6 +114,13 @@ class Metric:
         share = 1.0 - float(change @ left) / whole if whole > 0 else 1.0
         return left, float(np.clip(share, 0.0, 1.0))
 
+    def shown(self, row: np.ndarray) -> float:
+        """What a change adds to the projected cost where nothing else is wrong: d'Md."""
+        flat, change = self._columns, row.ravel()
+        along = flat.T @ change
+        imitated = float(along @ np.linalg.solve(self.normal.hessian, along)) if len(along) else 0.0
+        return max(float(change @ change) - imitated, 0.0)
+
     @property
     def _columns(self) -> np.ndarray:
         J = self.normal.derivatives
@@ -157,6 +169,7 @@ def scan(
     for candidate in candidates:
         groups.setdefault(_needed(windows.plant, candidate), []).append(candidate)
     profiles = []
+    known = whole.parameters
     for needed, members in groups.items():
         richer = windows.with_plant(staged(whole, *needed)) if needed else windows
         starts = carried(point.starts, windows, richer)
@@ -167,7 +180,8 @@ def scan(
         ]
         plants = [richer.plant.with_values({**values, **change}) for _, change in trials]
         rows = metric.rows(richer.residuals(plants, starts))
-        profiles += _profiles(metric, trials, rows, of_all)
+        sizes = [_typical_sizes(known[c.strength], change[c.strength]) for c, change in trials]
+        profiles += _profiles(metric, trials, sizes, rows, of_all)
     return sorted(profiles, key=lambda profile: -profile.drop)
 
 
@@ -189,17 +203,24 @@ def sizes_to_try(plant: Plant, candidate: Candidate) -> list[dict[str, float]]:
     ]
 
 
+def _typical_sizes(known: Parameter, value: float) -> float:
+    """How far a strength is off its null, in typical sizes."""
+    return abs((value - (known.null or 0.0)) / known.typical)
+
+
 def _profiles(
     metric: Metric,
     trials: list[tuple[Candidate, dict[str, float]]],
+    sizes: list[float],
     rows: np.ndarray,
     of_all: float,
 ) -> list[Profile]:
     found: dict[str, list[tuple[Trial, np.ndarray]]] = {}
-    before = metric.cost
-    for (candidate, change), row in zip(trials, rows, strict=True):
+    before, as_it_is = metric.cost, metric.normal.residual
+    for (candidate, change), size, row in zip(trials, sizes, rows, strict=True):
         cost, step = metric.explained(row)
-        trial = Trial(candidate, change, of_all * (before - cost), step)
+        shown = of_all * metric.shown(row - as_it_is)
+        trial = Trial(candidate, change, size, of_all * (before - cost), shown, step)
         found.setdefault(candidate.name, []).append((trial, row))
     profiles = []
     for pairs in found.values():

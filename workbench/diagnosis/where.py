@@ -18,11 +18,12 @@ import numpy as np
 from workbench.air import HEAT_CAPACITY_RATIO
 from workbench.comparison.regimes import regime_shares
 from workbench.diagnosis.result import Dependence, Where
+from workbench.effect import Balance
 from workbench.filtering import FilterResult, log_likelihoods, recording_filter, smooth
 from workbench.fitting.problem import Problem
 from workbench.linkage import Joint, Link
 from workbench.parts import Body, Chamber
-from workbench.plant import Plant
+from workbench.plant import Candidate, Plant
 from workbench.plant_filter import PlantFilter
 from workbench.recording import Recording
 
@@ -33,6 +34,7 @@ INTENSITIES = {  # of a rate, per sqrt(s)
     "velocity_rad_s": (20.0, 100.0),
     "pressure_pa": (1e5, 1e6),
 }
+INTO_GAS = (Balance.VALVE, Balance.FLOW, Balance.MASS, Balance.ENERGY, Balance.SUPPLY)
 PROCESS = {  # what no model is without
     "velocity_m_s": 0.3,
     "velocity_rad_s": 6.0,
@@ -84,6 +86,18 @@ def locate(problem: Problem, recordings: Sequence[Recording]) -> Where | None:
         against=_dependences(plant, recording, result, term, decimate),
         by_regime=regime_shares(problem.base),
     )
+
+
+def acts_in(candidate: Candidate, balance: str) -> bool:
+    """True where a cause enters a balance, as :attr:`Where.balance` names it.
+
+    What acts on flows shows in the mass of every chamber, and what acts in one place only there.
+    """
+    place, _, kind = balance.rpartition(".")
+    own = candidate.cause.balance
+    if kind == Balance.MOMENTUM.value:
+        return own is Balance.MOMENTUM
+    return own in INTO_GAS and candidate.place in (None, place)
 
 
 def _gains(

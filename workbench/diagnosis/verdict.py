@@ -1,0 +1,84 @@
+"""The verdict of a diagnosis, and what it says in words (interface.md section 4)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from workbench.diagnosis.judge import SHARE_REASON
+from workbench.diagnosis.power import too_weak
+from workbench.diagnosis.result import NAMING, Law, Ranked, Verdict
+from workbench.fitting.errors import errors_of
+from workbench.fitting.gauss_newton import Fit
+
+FAR_ABOVE_NOISE = 3.0  # RMSE over noise that is worth a word where nothing is named
+BLIND_SHOWN = 4  # names of what a recording cannot show
+
+
+def judged(
+    ranking: tuple[Ranked, ...], law: Law | None, held_out: bool, far: Sequence[str]
+) -> Verdict:
+    """The verdict; ``held_out`` is False where there is no true validation recording.
+
+    A recording that could show few effects of the catalogue says little by showing none, unless
+    what hides them are errors ``far`` above the noise: then something is there.
+    """
+    if law:
+        return Verdict.NOT_IN_CATALOGUE
+    leader = ranking[0] if ranking else None
+    if leader and leader.accepted:
+        if leader.crowd:
+            return Verdict.RECORDING_TOO_WEAK
+        return Verdict.TIE if leader.tied_with or not held_out else Verdict.FOUND
+    if too_weak(ranking) and not far:
+        return Verdict.RECORDING_TOO_WEAK
+    if leader and leader.reasons == (SHARE_REASON,):
+        return Verdict.SMALL_PROXY
+    return Verdict.NOTHING_MISSING
+
+
+def far_above_noise(held_out: Fit | None) -> list[str]:
+    """Outputs whose held-out error without any addition is far above their noise, in words."""
+    if held_out is None:
+        return []
+    return [
+        f"{name} {error.rmse / error.noise:.0f} times its noise"
+        for name, error in errors_of(held_out, None)["train"].items()
+        if error.rmse > FAR_ABOVE_NOISE * error.noise
+    ]
+
+
+def unexplained(far: Sequence[str], verdict: Verdict) -> tuple[str, ...]:
+    """A warning where nothing is named and the error stays far above the noise all the same."""
+    if not far or verdict in NAMING or verdict is Verdict.NOT_IN_CATALOGUE:
+        return ()
+    return (f"unexplained errors remain on held-out windows: {', '.join(far)}",)
+
+
+def sentence(verdict: Verdict, ranking: tuple[Ranked, ...], law: Law | None) -> str:
+    """The verdict in words."""
+    leader = ranking[0] if ranking else None
+    if verdict is Verdict.NOT_IN_CATALOGUE and law:
+        return f"nothing in the catalogue: {law.text} (empirical, not a physical effect)"
+    if verdict is Verdict.RECORDING_TOO_WEAK:
+        return _too_weak(ranking)
+    if leader is None or verdict not in NAMING:
+        return "nothing in the catalogue earns its place"
+    name, share = leader.candidate.name, f"{leader.drop_train:.0%}"
+    if verdict is Verdict.FOUND:
+        return f"{name} is missing: it removes {share} of the misfit beyond noise"
+    if verdict is Verdict.SMALL_PROXY:
+        return f"{name} explains {share} of the misfit and may stand for something else"
+    if not leader.tied_with:
+        return f"{name} ({share} of the misfit), on no more than one recording"
+    return f"{name} ({share} of the misfit), not to be told here from {', '.join(leader.tied_with)}"
+
+
+def _too_weak(ranking: tuple[Ranked, ...]) -> str:
+    leader = ranking[0]
+    if leader.accepted:
+        rivals = ", ".join((*leader.tied_with, *leader.crowd))
+        return f"{leader.candidate.name} and {rivals} do the same to this recording"
+    blind = [row.candidate.name for row in ranking if row.blind]
+    names = ", ".join(blind[:BLIND_SHOWN])
+    more = f" and {len(blind) - BLIND_SHOWN} more" if len(blind) > BLIND_SHOWN else ""
+    return f"this recording would not show {names}{more}, were they there in their typical size"
