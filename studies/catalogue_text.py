@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import inspect
 from collections.abc import Sequence
 from pathlib import Path
@@ -127,14 +126,11 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 def studies_text() -> str:
-    """One line per study: what it is, and the command that runs it."""
-    rows = []
-    for path in sorted(Path(__file__).parent.glob("*.py")):
-        said = (ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or "").split("\n")[0]
-        if said.startswith("Study "):
-            name, _, what = said.removeprefix("Study ").partition(": ")
-            rows.append((name.strip("`"), f"python -m studies.{path.stem}", what))
-    return columns(("study", "run by", "what it asks"), rows)
+    """One line per study: its name, what it asks, and where the question comes from."""
+    from studies.registry import STUDIES
+
+    rows = [(study.name, study.question, study.source) for study in STUDIES.values()]
+    return columns(("study", "what it asks", "source"), rows)
 
 
 def _names(full: list[str] | tuple[str, ...]) -> str:

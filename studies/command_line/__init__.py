@@ -3,7 +3,7 @@
 Whatever takes time to import is imported inside the commands, so that ``--help`` is quick.
 """
 
-from studies.command_line import catalogue, control, missing, plant, show
+from studies.command_line import catalogue, control, missing, plant, show, study
 from studies.command_line.application import app
 
 ORDER = [
@@ -20,11 +20,12 @@ ORDER = [
     "modes",
     "design",
     "check",
+    "study",
     "report",
 ]
 app.registered_commands.sort(key=lambda command: ORDER.index(command.callback.__name__))
 
-__all__ = ["app", "catalogue", "control", "main", "missing", "plant", "show"]
+__all__ = ["app", "catalogue", "control", "main", "missing", "plant", "show", "study"]
 
 
 def main() -> None:
