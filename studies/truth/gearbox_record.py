@@ -25,7 +25,7 @@ POSITION_NOISE_M, PRESSURE_NOISE_PA = 20e-6, 1e3
 POSITION_STEP_M = 30e-3 / 4096
 PRESSURE_STEP_PA = 16e5 / 4096
 WINDOW_SAMPLES = 250
-STARTS = tuple(range(0, 5000, 500))
+STARTS = tuple(range(0, 4500, 750))
 MANOEUVRES = dict(training=training_command, validation=validation_command)
 
 
