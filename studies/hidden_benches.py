@@ -10,8 +10,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from studies.truth import plants
 from studies.truth.case import Case
-from studies.truth.plants import SERVO_DRIVE as SERVO_DRIVE_TRUTH
 from studies.truth.plants import Truth
 from workbench.recording import Recording
 from workbench.rig import Rig, default_rig
@@ -73,7 +73,7 @@ class Bench:
 
 
 SERVO_DRIVE = Bench(
-    truth=SERVO_DRIVE_TRUTH,
+    truth=plants.SERVO_DRIVE,
     channels={
         "command_V": ("valve.command_v", 1.0),
         "position_mm": ("slide.position_m", 1e-3),
@@ -87,7 +87,29 @@ SERVO_DRIVE = Bench(
         "sensor_offset": "sensor_offset@chamber_a.pressure",
     },
 )
-BENCHES = {bench.plant: bench for bench in (SERVO_DRIVE,)}
+CRR_RIG = Bench(
+    truth=plants.CRR_RIG,
+    channels={
+        "command_V": ("valve.command_v", 1.0),
+        "position_mm": ("rod.position_m", 1e-3),
+        "cap_bar": ("cap.pressure_pa", 1e5),
+        "rod_side_bar": ("rod_side.pressure_pa", 1e5),
+        "supply_bar": ("supply.pressure_pa", 1e5),
+    },
+    always_there=(
+        "valve_lag",
+        "command_delay",
+        "sensor_lag",
+        "friction_position",
+        "wall_heat",
+        "area_shape",
+    ),
+    places={
+        "chamber_leak": "chamber_leak@cap",
+        "sensor_offset": "sensor_offset@cap.pressure",
+    },
+)
+BENCHES = {bench.plant: bench for bench in (SERVO_DRIVE, CRR_RIG)}
 
 
 def bench_of(case: Case) -> Bench:

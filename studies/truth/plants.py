@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from studies.truth import draw, misfit, record, rule
+from studies.truth import crr_rig_draw, crr_rig_misfit, crr_rig_record, draw, misfit, record, rule
 from studies.truth.case import Case
 
 Table = Mapping[str, np.ndarray]
@@ -59,4 +59,14 @@ SERVO_DRIVE = Truth(
     misfits=misfit.misfits,
     record=record.record,
 )
-TRUTHS = {truth.plant: truth for truth in (SERVO_DRIVE,)}
+CRR_RIG = Truth(
+    plant=crr_rig_draw.PLANT,
+    hidden=crr_rig_draw.HIDDEN,
+    outside_catalogue=crr_rig_draw.OUTSIDE_CATALOGUE,
+    stored=_stored("cases_crr_rig.json"),
+    draw=crr_rig_draw.draw,
+    draw_size=crr_rig_draw.draw_size,
+    misfits=crr_rig_misfit.misfits,
+    record=crr_rig_record.record,
+)
+TRUTHS = {truth.plant: truth for truth in (SERVO_DRIVE, CRR_RIG)}
