@@ -7,6 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from studies.truth import (
+    crr_rig_draw,
+    crr_rig_misfit,
+    crr_rig_record,
     draw,
     gearbox_draw,
     gearbox_record,
@@ -68,6 +71,16 @@ SERVO_DRIVE = Truth(
     misfits=misfit.misfits,
     record=record.record,
 )
+CRR_RIG = Truth(
+    plant=crr_rig_draw.PLANT,
+    hidden=crr_rig_draw.HIDDEN,
+    outside_catalogue=crr_rig_draw.OUTSIDE_CATALOGUE,
+    stored=_stored("cases_crr_rig.json"),
+    draw=crr_rig_draw.draw,
+    draw_size=crr_rig_draw.draw_size,
+    misfits=crr_rig_misfit.misfits,
+    record=crr_rig_record.record,
+)
 SOFT_JOINT = Truth(
     plant=soft_joint_draw.PLANT,
     hidden=soft_joint_draw.HIDDEN,
@@ -88,4 +101,4 @@ GEARBOX = Truth(
     misfits=gearbox_record.misfits,
     record=gearbox_record.record,
 )
-TRUTHS = {truth.plant: truth for truth in (SERVO_DRIVE, SOFT_JOINT, GEARBOX)}
+TRUTHS = {truth.plant: truth for truth in (SERVO_DRIVE, CRR_RIG, SOFT_JOINT, GEARBOX)}
