@@ -10,9 +10,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from studies.truth import plants
 from studies.truth.case import Case
-from studies.truth.plants import SERVO_DRIVE as SERVO_DRIVE_TRUTH
 from studies.truth.plants import Truth
+from studies.truth.soft_joint_run import SAMPLE_TIME_S as SOFT_JOINT_SAMPLE_TIME_S
 from workbench.recording import Recording
 from workbench.rig import Rig, default_rig
 
@@ -73,7 +74,7 @@ class Bench:
 
 
 SERVO_DRIVE = Bench(
-    truth=SERVO_DRIVE_TRUTH,
+    truth=plants.SERVO_DRIVE,
     channels={
         "command_V": ("valve.command_v", 1.0),
         "position_mm": ("slide.position_m", 1e-3),
@@ -87,7 +88,65 @@ SERVO_DRIVE = Bench(
         "sensor_offset": "sensor_offset@chamber_a.pressure",
     },
 )
-BENCHES = {bench.plant: bench for bench in (SERVO_DRIVE,)}
+CRR_RIG = Bench(
+    truth=plants.CRR_RIG,
+    channels={
+        "command_V": ("valve.command_v", 1.0),
+        "position_mm": ("rod.position_m", 1e-3),
+        "cap_bar": ("cap.pressure_pa", 1e5),
+        "rod_side_bar": ("rod_side.pressure_pa", 1e5),
+        "supply_bar": ("supply.pressure_pa", 1e5),
+    },
+    always_there=(
+        "valve_lag",
+        "command_delay",
+        "sensor_lag",
+        "friction_position",
+        "wall_heat",
+        "area_shape",
+    ),
+    places={
+        "chamber_leak": "chamber_leak@cap",
+        "sensor_offset": "sensor_offset@cap.pressure",
+    },
+)
+SOFT_JOINT = Bench(
+    truth=plants.SOFT_JOINT,
+    channels={
+        "command": ("valve.pwm", 1.0),
+        "pressure_bar": ("bellows.pressure_pa", 1e5),
+        "supply_bar": ("supply.pressure_pa", 1e5),
+    },
+    always_there=(
+        "valve_lag",
+        "command_delay",
+        "sensor_lag",
+        "area_shape",
+        "volume_expansion",
+        "bellows_creep",
+    ),
+    places={"sensor_offset": "sensor_offset@bellows.pressure"},
+    sample_time_s=SOFT_JOINT_SAMPLE_TIME_S,
+)
+GEARBOX = Bench(
+    truth=plants.GEARBOX,
+    channels={
+        "command_1": ("valve_1.command", 1.0),
+        "command_2": ("valve_2.command", 1.0),
+        "position_mm": ("main_piston.position_m", 1e-3),
+        "pressure_1_bar": ("chamber_1.pressure_pa", 1e5),
+        "pressure_2_bar": ("chamber_2.pressure_pa", 1e5),
+        "supply_bar": ("supply.pressure_pa", 1e5),
+    },
+    always_there=("sensor_lag", "command_delay", "friction_position"),
+    places={
+        "coulomb_friction": "coulomb_friction@main_piston",
+        "viscous_friction": "viscous_friction@main_piston",
+        "command_delay": "command_delay@valve_1",
+        "exhaust_restriction": "exhaust_restriction@valve_2",
+    },
+)
+BENCHES = {bench.plant: bench for bench in (SERVO_DRIVE, CRR_RIG, SOFT_JOINT, GEARBOX)}
 
 
 def bench_of(case: Case) -> Bench:

@@ -6,7 +6,19 @@ from pathlib import Path
 
 import numpy as np
 
-from studies.truth import draw, misfit, record, rule
+from studies.truth import (
+    crr_rig_draw,
+    crr_rig_misfit,
+    crr_rig_record,
+    draw,
+    gearbox_draw,
+    gearbox_record,
+    misfit,
+    record,
+    rule,
+    soft_joint_draw,
+    soft_joint_record,
+)
 from studies.truth.case import Case
 
 Table = Mapping[str, np.ndarray]
@@ -59,4 +71,34 @@ SERVO_DRIVE = Truth(
     misfits=misfit.misfits,
     record=record.record,
 )
-TRUTHS = {truth.plant: truth for truth in (SERVO_DRIVE,)}
+CRR_RIG = Truth(
+    plant=crr_rig_draw.PLANT,
+    hidden=crr_rig_draw.HIDDEN,
+    outside_catalogue=crr_rig_draw.OUTSIDE_CATALOGUE,
+    stored=_stored("cases_crr_rig.json"),
+    draw=crr_rig_draw.draw,
+    draw_size=crr_rig_draw.draw_size,
+    misfits=crr_rig_misfit.misfits,
+    record=crr_rig_record.record,
+)
+SOFT_JOINT = Truth(
+    plant=soft_joint_draw.PLANT,
+    hidden=soft_joint_draw.HIDDEN,
+    outside_catalogue=soft_joint_draw.OUTSIDE_CATALOGUE,
+    stored=_stored("cases_soft_joint.json"),
+    draw=soft_joint_draw.draw,
+    draw_size=soft_joint_draw.draw_size,
+    misfits=soft_joint_record.misfits,
+    record=soft_joint_record.record,
+)
+GEARBOX = Truth(
+    plant=gearbox_draw.PLANT,
+    hidden=gearbox_draw.HIDDEN,
+    outside_catalogue=gearbox_draw.OUTSIDE_CATALOGUE,
+    stored=_stored("cases_gearbox.json"),
+    draw=gearbox_draw.draw,
+    draw_size=gearbox_draw.draw_size,
+    misfits=gearbox_record.misfits,
+    record=gearbox_record.record,
+)
+TRUTHS = {truth.plant: truth for truth in (SERVO_DRIVE, CRR_RIG, SOFT_JOINT, GEARBOX)}
