@@ -8,6 +8,7 @@ from gearbox_shifts import ALL_SHIFTS, run
 
 from workbench.comparison.course import course_of
 from workbench.comparison.deviation import deviation, shift_deviations
+from workbench.comparison.gear_shift import begins_energised
 from workbench.plants.gearbox import gearbox
 
 
@@ -40,29 +41,41 @@ def test_what_does_not_vary_has_no_deviation():
 
 @pytest.fixture(scope="module")
 def recorded():
-    """All four shifts, as the plant itself makes them."""
-    return run(gearbox().lean(), ALL_SHIFTS, 2e-4)
+    """All four shifts, as the plant itself makes them, from 50 ms before the first."""
+    return run(gearbox().lean(), (((0, 0), 0.05), *ALL_SHIFTS), 2e-4)
 
 
-def test_the_table_has_the_four_cases_and_no_deviation_of_the_plant_from_itself(recorded):
-    found = shift_deviations(course_of(gearbox(), recorded))
+@pytest.fixture(scope="module")
+def table(recorded):
+    return shift_deviations(course_of(gearbox(), recorded))
 
-    assert [shift.case for shift in found] == ["N to H", "H to N", "N to L", "L to N"]
-    starts = np.cumsum([0.0, *(duration for _, duration in ALL_SHIFTS[:-1])])[::2]
-    assert [shift.start_s for shift in found] == pytest.approx(starts, abs=3e-4)
-    for shift in found:
+
+def test_the_table_has_the_four_cases_and_no_deviation_of_the_plant_from_itself(table):
+    assert [shift.case for shift in table] == ["N to H", "H to N", "N to L", "L to N"]
+    starts = np.cumsum([0.05, *(duration for _, duration in ALL_SHIFTS[:-1])])[::2]
+    assert [shift.start_s for shift in table] == pytest.approx(starts, abs=3e-4)
+    for shift in table:
         assert 0.01 < shift.end_s - shift.start_s < 0.06
         assert max(shift.deviations.values()) < 5e-3
 
 
-def test_a_constant_error_of_a_pressure_is_its_share_of_the_range(recorded):
-    """A tenth of the range added to what was recorded, and to the state that it starts from."""
-    name = "chamber_1.pressure_pa"
-    shift = shift_deviations(course_of(gearbox(), recorded))[0]
-    inside = slice(*(round(t / recorded.sample_time_s) for t in (shift.start_s, shift.end_s)))
-    span = np.ptp(recorded[name][inside])
-    lifted = {**recorded.channels, name: recorded[name] + 0.1 * span}
+def test_a_constant_error_of_a_pressure_is_its_share_of_the_range(recorded, table):
+    """A tenth of the range, added from the change of the commands on."""
+    name, shift = "chamber_1.pressure_pa", table[0]
+    first, last = (round(t / recorded.sample_time_s) for t in (shift.start_s, shift.end_s))
+    span = np.ptp(recorded[name][first : last + 1])
+    lifted = recorded[name] + 0.1 * span * (np.arange(len(recorded)) >= first)
+    short = replace(recorded, channels={**recorded.channels, name: lifted}).part(0, last + 200)
 
-    found = shift_deviations(course_of(gearbox(), replace(recorded, channels=lifted)))[0]
+    (found,) = shift_deviations(course_of(gearbox(), short))
 
-    assert found.deviations[name] == pytest.approx(0.1, abs=0.02)
+    assert found.case == "N to H"
+    assert found.deviations[name] == pytest.approx(0.1, abs=2e-3)
+
+
+def test_a_shift_that_began_before_the_recording_is_not_counted_and_that_is_said(recorded):
+    """What the armature did before is not known."""
+    late = course_of(gearbox(), recorded.part(260, 500))
+
+    assert shift_deviations(late) == () and begins_energised(late)
+    assert not begins_energised(course_of(gearbox(), recorded.part(0, 500)))

@@ -15,6 +15,7 @@ import numpy as np
 
 from workbench.comparison.course import Course, course_of
 from workbench.comparison.deviation import ShiftDeviation, shift_deviations
+from workbench.comparison.gear_shift import begins_energised
 from workbench.comparison.horizons import (
     FREE_RUN,
     JUDGED,
@@ -173,10 +174,12 @@ def _by_regime(course: Course, squared: np.ndarray) -> tuple[Regime, ...]:
 
 
 def _shifts(course: Course) -> tuple[tuple[ShiftDeviation, ...], list[str]]:
+    early = "the first shift began before the recording: its deviation is not known"
+    notes = [early] if begins_energised(course) else []
     try:
-        return shift_deviations(course), []
+        return shift_deviations(course), notes
     except ArithmeticError as error:
-        return (), [f"no deviation of the shifts: {error}"]
+        return (), [*notes, f"no deviation of the shifts: {error}"]
 
 
 def _squared(errors: Rows) -> np.ndarray:

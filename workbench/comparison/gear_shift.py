@@ -95,7 +95,10 @@ def phases(course: Course) -> dict[str, np.ndarray]:
 
 
 def shifts(course: Course) -> tuple[Shift, ...]:
-    """Every change of the commands after which another gear was reached."""
+    """Every change of the commands after which another gear was reached.
+
+    Where a piece begins with energised valves it is not known since when they are.
+    """
     gears, on = gears_of(course), _energised(course)
     if gears is None or not len(on):
         return ()
@@ -108,6 +111,12 @@ def shifts(course: Course) -> tuple[Shift, ...]:
             if on[:, first].any():
                 found.append(_shift(gears, first, until, waiting))
     return tuple(shift for shift in found if shift)
+
+
+def begins_energised(course: Course) -> bool:
+    """True where a shift may have begun before the recording did."""
+    on = _energised(course)
+    return gears_of(course) is not None and bool(on.size and on[:, 0].any())
 
 
 def _shift(gears: Gears, first: int, until: int, waiting: int) -> Shift | None:
