@@ -22,6 +22,7 @@ from workbench.comparison.compare import (
     signal_error,
 )
 from workbench.comparison.deviation import ShiftDeviation
+from workbench.comparison.horizons import lost
 from workbench.comparison.regimes import regimes, shares
 from workbench.comparison.run import run
 from workbench.errors import InputError
@@ -258,3 +259,26 @@ def test_without_position_and_commands_there_are_fewer_maps():
     found = compare(chamber, [recording])
 
     assert set(comparison_figures(found)) == {"comparison_decay", "residuals_decay"}
+
+
+def test_a_plant_with_one_state_is_compared_over_all_horizons():
+    joint, n = default_rig("soft_joint"), 400
+    commands = Recording("fill", 2.5e-3, {"valve.pwm": np.repeat([0.5, 0.7, 0.5, 0.3], n // 4)})
+    clean = run(joint, commands)
+    noisy = clean["bellows.pressure_pa"] + 1e3 * np.random.default_rng(4).standard_normal(n)
+    recording = replace(commands, channels={**commands.channels, "bellows.pressure_pa": noisy})
+
+    found = compare(joint, [recording]).recordings[0]
+
+    assert set(found.errors) == {ONE_STEP, WINDOW, FREE_RUN}
+    assert found.errors[ONE_STEP]["bellows.pressure_pa"].rmse < 1.5e3
+    assert found.notes == ()
+
+
+def test_it_is_said_from_when_on_a_filter_gave_nothing(recording):
+    ahead = np.where(np.arange(len(recording)) < 150, 0.0, np.nan)
+
+    (said,) = lost(recording, {POSITION: ahead})
+
+    assert said == "one step: the filter gave nothing for 75 % of the samples, the first at 0.15 s"
+    assert lost(recording, {POSITION: np.zeros(len(recording))}) == []

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 ACROSS = 3
 COLOURS = "cividis_r"  # even steps of grey too; dark is much
 EMPTY = "0.93"
+LEVELS = 2  # of a switched command
 
 
 def map_figure(maps: Sequence[ErrorMap], title: str) -> Figure:
@@ -40,11 +41,17 @@ def map_figure(maps: Sequence[ErrorMap], title: str) -> Figure:
             drawn = axes.pcolormesh(x, y, rms, cmap=COLOURS, vmin=0.0, rasterized=True)
             axes.set_facecolor(EMPTY)
             axes.grid(False)
-            axes.set_xlabel(labelled(each.x_name))
-            axes.set_ylabel(labelled(each.y_name))
+            axes.set_xlabel(_with_unit(each.x_name))
+            axes.set_ylabel(_with_unit(each.y_name))
+            if len(x) == LEVELS + 1:
+                axes.set_xticks((x[1:] + x[:-1]) / 2.0)
             axes.set_title(public_name(each.output).replace(".", " ").replace("_", " "))
             bar = figure.colorbar(drawn, ax=axes)
             bar.set_label(f"RMS error ({display_unit(each.output)})")
             bar.outline.set_visible(False)
         figure.suptitle(f"{title}; grey: too few samples", fontsize=8)
     return figure
+
+
+def _with_unit(name: str) -> str:
+    return labelled(name) if display_unit(name) else f"{labelled(name)} (-)"

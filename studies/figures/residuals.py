@@ -40,10 +40,13 @@ def residual_figure(each: RecordingComparison) -> Figure:
 
 
 def _draw_spectrum(axes: Axes, name: str, residual: Residual) -> None:
+    from matplotlib.ticker import NullFormatter
+
     per = 1.0 / display_scale(name).factor ** 2
     axes.loglog(
         residual.frequency_hz[1:], per * residual.density[1:], "-", color=BLUE, label="error"
     )
+    axes.xaxis.set_minor_formatter(NullFormatter())
     axes.axhline(per * residual.floor, color=RED, linestyle="--", label="noise alone")
     axes.set_ylabel(f"{_words(name)}\n({_squared(display_unit(name))}/Hz)")
 

@@ -35,7 +35,8 @@ def foretold(course: Course, noise: Mapping[str, float]) -> tuple[dict[str, Rows
     plant, recording = course.plant, course.recording
     if not plant.model.states:
         return {PLAIN: _outputs(plant, simulate(plant, recording))}, []
-    found, notes = {ONE_STEP: _one_step(plant, recording, noise)}, []
+    found = {ONE_STEP: _one_step(plant, recording, noise)}
+    notes = lost(recording, found[ONE_STEP])
     try:
         found[WINDOW] = _windows(cut_windows(plant, [recording], noise))
     except ValueError as error:
@@ -45,6 +46,17 @@ def foretold(course: Course, noise: Mapping[str, float]) -> tuple[dict[str, Rows
     except ArithmeticError as error:
         notes.append(f"no free run: {error}")
     return found, notes
+
+
+def lost(recording: Recording, ahead: Rows) -> list[str]:
+    """From when on the one-step filter gave no numbers, in words."""
+    recorded = np.isfinite(recording.rows(ahead)).any(axis=0)
+    missing = np.flatnonzero(recorded & ~np.isfinite([*ahead.values()]).any(axis=0))
+    if not len(missing):
+        return []
+    share, start_s = len(missing) / recorded.sum(), recording.sample_time_s * missing[0]
+    told = f"{100 * share:.0f} % of the samples, the first at {start_s:.4g} s"
+    return [f"one step: the filter gave nothing for {told}"]
 
 
 def _outputs(plant: Plant, recording: Recording) -> Rows:
