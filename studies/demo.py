@@ -29,7 +29,8 @@ from studies.figures.modes import pole_figure
 from studies.figures.style import save_all
 from studies.figures.summary import summary_figure
 from studies.report.page import FIGURES, Section, write_report
-from studies.text_of_results import addition_text, comparison_text, diagnosis_text, unit_names
+from studies.text_of_comparison import comparison_text
+from studies.text_of_results import addition_text, diagnosis_text, unit_names
 from workbench.comparison import compare
 from workbench.diagnosis.diagnose import diagnose
 from workbench.diagnosis.improve import accept

@@ -11,7 +11,7 @@ from workbench.units import public_name, si_unit
 if TYPE_CHECKING:
     from linearize.modes import HybridModel
     from studies.closed_loop_check import Check
-    from workbench.comparison.compare import Comparison
+    from workbench.comparison.compare import Comparison, RecordingComparison
     from workbench.diagnosis.result import Diagnosis, Law, Ranked, Where
     from workbench.fitting.errors import SignalError
 
@@ -19,37 +19,52 @@ Document = dict[str, Any]
 
 
 def comparison_document(found: Comparison) -> Document:
-    """A comparison: errors by horizon and signal, regimes, worst windows."""
+    """A comparison: errors by horizon and signal, regimes, worst windows, gear shifts."""
     return {
         "schema": "workbench.comparison/1",
         "rig": found.rig_name,
-        "recordings": [
-            {
-                "recording": each.name,
-                "errors": {
-                    horizon: {public_name(name): signal(error, name) for name, error in row.items()}
-                    for horizon, row in each.errors.items()
-                },
-                "by_regime": [
-                    {
-                        "regime": regime.name,
-                        "share_of_error": plain(regime.share_of_error),
-                        "share_of_time": plain(regime.share_of_time),
-                    }
-                    for regime in each.by_regime
-                ],
-                "worst": [
-                    {
-                        "start_s": plain(span.start_s),
-                        "end_s": plain(span.end_s),
-                        "share_of_error": plain(span.share_of_error),
-                    }
-                    for span in each.worst
-                ],
-                "notes": list(each.notes),
+        "recordings": [_compared(each) for each in found.recordings],
+    }
+
+
+def _compared(each: RecordingComparison) -> Document:
+    return {
+        "recording": each.name,
+        "errors": {
+            horizon: {public_name(name): signal(error, name) for name, error in row.items()}
+            for horizon, row in each.errors.items()
+        },
+        "noise": {
+            public_name(name): {
+                "value": plain(noise.value),
+                "unit": si_unit(name),
+                "from": noise.source.value,
             }
-            for each in found.recordings
+            for name, noise in each.noise.items()
+        },
+        "lags_outside_band": {
+            public_name(name): plain(residual.outside) for name, residual in each.residuals.items()
+        },
+        "judged_on": each.judged,
+        "by_regime": [
+            {
+                "regime": regime.name,
+                "share_of_error": plain(regime.share_of_error),
+                "share_of_time": plain(regime.share_of_time),
+            }
+            for regime in each.by_regime
         ],
+        "worst": [{key: plain(value) for key, value in vars(span).items()} for span in each.worst],
+        "shifts": [
+            {
+                "case": shift.case,
+                "start_s": plain(shift.start_s),
+                "end_s": plain(shift.end_s),
+                "deviation": {public_name(n): plain(e) for n, e in shift.deviations.items()},
+            }
+            for shift in each.shifts
+        ],
+        "notes": list(each.notes),
     }
 
 

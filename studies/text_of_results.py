@@ -1,4 +1,4 @@
-"""Comparisons, diagnoses, additions and fits as text."""
+"""Diagnoses, additions and fits as text."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from workbench.units import public_name
 if TYPE_CHECKING:
     import numpy as np
 
-    from workbench.comparison.compare import Comparison, RecordingComparison
     from workbench.diagnosis.improve import Addition, Improvement
     from workbench.diagnosis.result import Diagnosis, Law, Ranked
     from workbench.fitting.errors import SignalError
@@ -22,39 +21,6 @@ SHOWN_RANKS = 12
 CORRELATED = 0.9
 
 Errors = Mapping[str, Mapping[str, "SignalError"]]
-
-
-def comparison_text(found: Comparison) -> str:
-    """Errors by horizon, regimes and worst windows of each recording."""
-    return "\n\n".join(_recording_text(each) for each in found.recordings)
-
-
-def _recording_text(each: RecordingComparison) -> str:
-    errors = columns(
-        ("signal", "horizon", "RMSE", "fit %", "noise"),
-        [
-            (
-                public_name(name),
-                horizon,
-                shown(error.rmse, name),
-                number(error.fit_percent, 3),
-                shown(error.noise, name, 2),
-            )
-            for name in each.measured
-            for horizon, row in each.errors.items()
-            if (error := row.get(name))
-        ],
-    )
-    regimes = columns(
-        ("where the error is", "of the error", "of the time"),
-        [(r.name, percent(r.share_of_error), percent(r.share_of_time)) for r in each.by_regime],
-    )
-    worst = ", ".join(
-        f"{span.start_s:.2f} to {span.end_s:.2f} s ({percent(span.share_of_error, 1)})"
-        for span in each.worst
-    )
-    parts = [f"{each.name}: {each.time_s[-1]:.4g} s", errors, regimes, f"worst: {worst}"]
-    return "\n".join(filter(None, [*parts, *each.notes]))
 
 
 def diagnosis_text(found: Diagnosis, unit_of: Mapping[str, str]) -> str:

@@ -1,12 +1,28 @@
 """Comparison of a plant with its recordings: errors by horizon, regimes, worst windows."""
 
+import csv
+import json
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from studies.documents import comparison_document
+from studies.figures.comparison import comparison_figures
+from studies.figures.style import save
+from studies.text_of_comparison import comparison_text
 from workbench.comparison import compare
-from workbench.comparison.compare import FREE_RUN, ONE_STEP, PLAIN, WINDOW, signal_error
+from workbench.comparison.compare import (
+    FREE_RUN,
+    ONE_STEP,
+    PLAIN,
+    WINDOW,
+    Comparison,
+    signal_error,
+)
+from workbench.comparison.deviation import ShiftDeviation
+from workbench.comparison.horizons import lost
 from workbench.comparison.regimes import regimes, shares
 from workbench.comparison.run import run
 from workbench.errors import InputError
@@ -120,7 +136,8 @@ def test_the_valve_is_closed_inside_its_dead_zone(drive, recording):
 def test_valve_sides_and_directions_part_the_time(drive, recording):
     found = regimes(drive.fit_for(recording).lean(), recording)
 
-    sides = sum(mask.astype(int) for name, mask in found.items() if name.startswith("valve"))
+    names = ("valve closed", "valve open above 4.95 V", "valve open below 4.95 V")
+    sides = sum(found[name].astype(int) for name in names)
     ways = sum(found[n].astype(int) for n in ("at rest", "moving forward", "moving backward"))
     assert (sides == 1).all() and (ways == 1).all()
 
@@ -171,3 +188,97 @@ def test_a_plant_without_states_is_compared_sample_by_sample():
 def test_a_run_without_the_command_is_refused(drive):
     with pytest.raises(InputError, match=r"servo_drive needs valve\.command"):
         run(drive, Recording("empty", DT, {"supply.pressure_pa": np.full(10, 7e5)}))
+
+
+def test_the_document_holds_noise_regimes_shifts_and_whiteness(drive, bad):
+    document = comparison_document(Comparison(drive.name, (bad,)))
+    (found,) = json.loads(json.dumps(document, allow_nan=False))["recordings"]
+
+    assert found["noise"]["chamber_a.pressure"] == {
+        "value": 400.0, "unit": "Pa", "from": "given with the recording",
+    }  # fmt: skip
+    assert found["judged_on"] == WINDOW and found["shifts"] == []
+    assert {"regime", "share_of_error", "share_of_time"} == set(found["by_regime"][0])
+    assert {"start_s", "end_s", "share_of_error"} == set(found["worst"][0])
+    assert 0.0 <= found["lags_outside_band"]["slide.position"] <= 1.0
+
+
+def test_a_recording_of_gear_shifts_prints_the_table_of_paper_003(bad):
+    cases = (
+        ShiftDeviation("N to H", 0.1, 0.1203, {PRESSURE: 0.0429, POSITION: 0.045}),
+        ShiftDeviation("H to N", 0.5, 0.54, {PRESSURE: 0.1003, POSITION: float("nan")}),
+    )
+    gearbox = replace(bad, shifts=cases)
+
+    said = comparison_text(Comparison("gearbox", (gearbox,))).splitlines()
+    (document,) = comparison_document(Comparison("gearbox", (gearbox,)))["recordings"]
+
+    (first,) = (k for k, line in enumerate(said) if line.startswith("deviation of the shift"))
+    rows = [line.split("  ") for line in said[first + 1 : first + 4]]
+    cells = [[cell.strip() for cell in row if cell.strip()] for row in rows]
+    assert cells[0] == ["N to H", "0.100 s", "20.3 ms", "4.29 %", "4.50 %"]
+    assert cells[1] == ["H to N", "0.500 s", "40.0 ms", "10.03 %", "-"]
+    assert cells[2] == ["mean", "-", "-", "7.16 %", "4.50 %"]
+    assert document["shifts"][0]["deviation"] == {
+        "chamber_a.pressure": 0.0429, "slide.position": 0.045,
+    }  # fmt: skip
+    assert document["shifts"][1]["deviation"]["slide.position"] is None
+
+
+def test_every_figure_of_a_comparison_has_axes_with_units(drive, bad, tmp_path):
+    figures = comparison_figures(Comparison(drive.name, (bad,)))
+
+    kinds = "comparison", "regimes", "error_over_motion", "error_over_command", "residuals"
+    assert list(figures) == [f"{kind}_manoeuvre" for kind in kinds]
+    for name, figure in figures.items():
+        shown = [axes for axes in figure.axes if axes.get_visible()]
+        words = [{axes.get_xlabel(), axes.get_ylabel()} - {""} for axes in shown]
+        assert all(words), name
+        assert all(re.search(r"\(.+\)$", word) for some in words for word in some), name
+        save(figure, tmp_path / name, "workbench compare")
+
+
+def test_the_table_beside_a_map_holds_its_cells(drive, bad, tmp_path):
+    figures = comparison_figures(Comparison(drive.name, (bad,)))
+    save(figures["error_over_command_manoeuvre"], tmp_path / "map", "workbench compare")
+
+    (drawn,) = (each for each in bad.over_command if each.output == PRESSURE)
+    with (tmp_path / "map.csv").open() as file:
+        rows = [row for row in csv.DictReader(file) if row["panel"] == "chamber a pressure"]
+    assert len(rows) == np.isfinite(drawn.rms).sum() > 3
+    assert max(float(row["curve"]) for row in rows) == pytest.approx(
+        1e-5 * np.nanmax(drawn.rms), rel=1e-3
+    )
+
+
+def test_without_position_and_commands_there_are_fewer_maps():
+    chamber = default_rig("closed_chamber")
+    pressure_pa = np.linspace(5e5, 4.9e5, 400) + 500 * np.random.default_rng(2).standard_normal(400)
+    recording = Recording("decay", DT, {"chamber.pressure_pa": pressure_pa})
+
+    found = compare(chamber, [recording])
+
+    assert set(comparison_figures(found)) == {"comparison_decay", "residuals_decay"}
+
+
+def test_a_plant_with_one_state_is_compared_over_all_horizons():
+    joint, n = default_rig("soft_joint"), 400
+    commands = Recording("fill", 2.5e-3, {"valve.pwm": np.repeat([0.5, 0.7, 0.5, 0.3], n // 4)})
+    clean = run(joint, commands)
+    noisy = clean["bellows.pressure_pa"] + 1e3 * np.random.default_rng(4).standard_normal(n)
+    recording = replace(commands, channels={**commands.channels, "bellows.pressure_pa": noisy})
+
+    found = compare(joint, [recording]).recordings[0]
+
+    assert set(found.errors) == {ONE_STEP, WINDOW, FREE_RUN}
+    assert found.errors[ONE_STEP]["bellows.pressure_pa"].rmse < 1.5e3
+    assert found.notes == ()
+
+
+def test_it_is_said_from_when_on_a_filter_gave_nothing(recording):
+    ahead = np.where(np.arange(len(recording)) < 150, 0.0, np.nan)
+
+    (said,) = lost(recording, {POSITION: ahead})
+
+    assert said == "one step: the filter gave nothing for 75 % of the samples, the first at 0.15 s"
+    assert lost(recording, {POSITION: np.zeros(len(recording))}) == []

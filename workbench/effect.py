@@ -75,9 +75,13 @@ class AddedMass(Term):
 
 @dataclass(frozen=True)
 class MassFlow(Term):
-    """Gas entering a balance, in kg/s, with the temperature it brings along."""
+    """Gas entering a balance, in kg/s, with the temperature it brings along.
+
+    ``choked_share`` is psi(p_d/p_u) of its path, 1 where it is choked; none where there is no path.
+    """
 
     temperature_k: Expression
+    choked_share: Expression | None = None
 
 
 Received = Callable[[str], list[Term]]  # the terms that a balance received, by its name

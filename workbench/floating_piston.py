@@ -138,4 +138,4 @@ class ControlChamber(SharedChamber):
         yield from super().terms(now)
         path = path_between(now[self.name], now["atmosphere"])
         lost_kg_s = path.flow_kg_s(self.port_area_m2, NozzleLaw())
-        yield MassFlow(self.name, -lost_kg_s, path.temperature_k)
+        yield MassFlow(self.name, -lost_kg_s, path.temperature_k, NozzleLaw()(path.ratio))

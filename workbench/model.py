@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -9,10 +10,23 @@ import casadi as ca
 import numpy as np
 
 from workbench.compiled import compiled
-from workbench.effect import Conditions, Expression
+from workbench.effect import Conditions, Expression, MassFlow, Term
 from workbench.rosenbrock import controlled_step
 
 BLOCK = 20  # samples of one call
+
+
+@dataclass(frozen=True)
+class FlowPath:
+    """A path of gas: who makes it, and the balance that it enters where its flow is positive.
+
+    ``choked_share`` is the flow over what it would be if choked, psi(p_d/p_u).
+    """
+
+    effect: str
+    balance: str
+    flow_kg_s: Expression
+    choked_share: Expression
 
 
 @dataclass(frozen=True)
@@ -29,6 +43,8 @@ class Model:
         dx/dt, shape (n_x, 1), and y, shape (n_y, 1).
     flows
         Every single flow, by ``(effect, kind, balance)``: who does what to whom.
+    paths
+        Every path of gas of which it is known where it is choked.
     tolerances
         Error per step that the integrator lets pass, shape (n_x,).
     conditions
@@ -44,6 +60,7 @@ class Model:
     rates: ca.SX
     outputs: ca.SX
     flows: dict[tuple[str, str, str], Expression]
+    paths: tuple[FlowPath, ...]
     tolerances: np.ndarray
     conditions: Conditions = field(repr=False)
     _steps: dict[float, ca.Function] = field(default_factory=dict, repr=False)
@@ -110,6 +127,15 @@ class Model:
         if sample_time_s not in self._blocks:
             self._blocks[sample_time_s] = compiled(self.block(sample_time_s))
         return self._blocks[sample_time_s]
+
+
+def flow_paths(flows: Iterable[tuple[str, Term]]) -> tuple[FlowPath, ...]:
+    """The paths among the flows of these effects, by name of the effect."""
+    return tuple(
+        FlowPath(effect, term.balance, term.value, term.choked_share)
+        for effect, term in flows
+        if isinstance(term, MassFlow) and term.choked_share is not None
+    )
 
 
 def run_of(block: ca.Function, samples: int) -> ca.Function:

@@ -14,7 +14,7 @@ import casadi as ca
 import numpy as np
 
 from workbench.effect import Cause, Conditions, Effect, Expression, Parameter, Part, State, Term
-from workbench.model import Model
+from workbench.model import Model, flow_paths
 
 
 @dataclass(frozen=True)
@@ -226,6 +226,7 @@ class Plant:
             rates=ca.vertcat(ca.SX(0, 1), *(rates[name] for name in x)),
             outputs=ca.vertcat(*outputs),
             flows=_by_name(flows),
+            paths=flow_paths(flows),
             tolerances=np.array([s.tolerance for s in self.state_list.values()]),
             conditions=now,
         )

@@ -119,7 +119,7 @@ class PlantFilter:
         d = ca.MX.sym("d", len(model.measured_inputs), self.decimate)
         p = ca.MX.sym("p", len(model.parameters))
         S, E = self.scale, self._entering
-        x, w = S[:n] * X[:n], S[n:] * X[n:]
+        x, w = S[:n] * X[:n], S[n:] * X[n:, 0]
         A = model.jacobians(x, u[:, 0], d[:, 0], p)[0]
         A = A * np.outer(1 / plant.scale, plant.scale)
         coupling = E * np.outer(1 / plant.scale, S[n:])
@@ -128,7 +128,7 @@ class PlantFilter:
         step = self._step
         for k in range(self.decimate):
             x = step(x, u[:, k], d[:, k], ca.vertcat(p, w))
-        later = ca.vertcat(x / plant.scale, X[n:])
+        later = ca.vertcat(x / plant.scale, X[n:, 0])
         P_later = F @ (P + Q / 2) @ F.T + Q / 2
         return ca.Function("predict", [X, P, u, d, p, Q], [later, P_later, F])
 

@@ -62,7 +62,7 @@ def compare(
     """Error by signal, horizon and regime, and where the plant fails."""
     with answering(quiet) as say:
         from studies.documents import comparison_document
-        from studies.text_of_results import comparison_text
+        from studies.text_of_comparison import comparison_text
         from workbench.comparison import compare
         from workbench.rig import load_rig
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from math import ceil
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from studies.figures.error_maps import map_figure
+from studies.figures.residuals import residual_figure
 from studies.figures.style import BLUE, GREY, ORANGE, PAGE_IN, RED, new_figure, styled, thinned
 from studies.text import labelled
 from workbench.comparison.compare import FREE_RUN, ONE_STEP, PLAIN, WINDOW
@@ -19,33 +22,58 @@ if TYPE_CHECKING:
 
 LINES = {ONE_STEP: ("-.", ORANGE), WINDOW: ("-", BLUE), FREE_RUN: ("--", RED), PLAIN: ("-", BLUE)}
 OVERLAID = (FREE_RUN, WINDOW, PLAIN)
+IN_A_COLUMN = 4  # outputs
+SHOWN_REGIMES = 20
 
 
 def comparison_figures(found: Comparison, prefix: str = "") -> dict[str, Figure]:
-    """Two figures per recording, by file name."""
+    """The figures of every recording by file name; what a plant lacks has none."""
     figures = {}
     for each in found.recordings:
         name = each.name.replace(" ", "_")
         figures[f"{prefix}comparison_{name}"] = overlay_figure(each)
         if each.by_regime:
             figures[f"{prefix}regimes_{name}"] = regime_figure(each)
+        if each.over_motion:
+            title = f"{each.name}: error over position and speed, {each.judged}"
+            figures[f"{prefix}error_over_motion_{name}"] = map_figure(each.over_motion, title)
+        if each.over_command:
+            title = f"{each.name}: error over command and pressure, {each.judged}"
+            figures[f"{prefix}error_over_command_{name}"] = map_figure(each.over_command, title)
+        figures[f"{prefix}residuals_{name}"] = residual_figure(each)
     return figures
 
 
 def overlay_figure(each: RecordingComparison) -> Figure:
-    """Every output measured and simulated, and its error over windows; the worst are shaded."""
+    """Every output measured and simulated with the error beneath; the worst windows shaded."""
+    names = list(each.measured)
+    across = ceil(len(names) / IN_A_COLUMN)
+    down = ceil(len(names) / across)
     with styled():
-        figure = new_figure(PAGE_IN, 0.9 + 1.35 * len(each.measured))
-        panels = figure.subplots(len(each.measured), 2, sharex=True, squeeze=False)
-        for name, (left, right) in zip(each.measured, panels, strict=True):
-            _draw_overlay(left, each, name)
-            _draw_error(right, each, name)
-        for axes in panels[-1]:
-            axes.set_xlabel("time (s)")
-        panels[0, 0].set_title(f"{each.name}: measured and simulated")
-        panels[0, 1].set_title("measured minus simulated, worst windows shaded")
+        figure = new_figure(PAGE_IN, 0.9 + 1.7 * down)
+        panels = figure.subplots(
+            2 * down, across, sharex=True, squeeze=False, height_ratios=(1.6, 1.0) * down
+        )
+        for axes in panels.flat[2 * len(names) :]:
+            axes.set_visible(False)
+        for k, name in enumerate(names):
+            row, column = 2 * (k // across), k % across
+            upper, lower = panels[row : row + 2, column]
+            _draw_overlay(upper, each, name)
+            _draw_error(lower, each, name)
+            for axes in (upper, lower):
+                axes.set_visible(True)
+                _mark_worst(axes, each)
+            if k + across >= len(names):
+                lower.set_xlabel("time (s)")
+                lower.tick_params(labelbottom=True)
+        figure.suptitle(
+            f"{each.name}: measured, simulated and error, worst windows shaded", fontsize=8
+        )
         handles, labels = panels[0, 0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=len(handles))
+        more, words = panels[1, 0].get_legend_handles_labels()
+        columns = len(handles) + len(more)
+        figure.legend(handles + more, labels + words, loc="outside lower center", ncols=columns)
     return figure
 
 
@@ -58,7 +86,7 @@ def _draw_overlay(axes: Axes, each: RecordingComparison, name: str) -> None:
             style, colour = LINES[horizon]
             (simulated,) = thinned(each.simulated[horizon][name])
             axes.plot(time_s, to_people(simulated), linestyle=style, color=colour, label=horizon)
-    axes.set_ylabel(labelled(name))
+    axes.set_ylabel(labelled(name).replace(" (", "\n("))
     _hold_range(axes, to_people(measured))
 
 
@@ -72,29 +100,36 @@ def _hold_range(axes: Axes, measured: np.ndarray) -> None:
 
 def _draw_error(axes: Axes, each: RecordingComparison, name: str) -> None:
     factor = 1.0 / display_scale(name).factor
-    horizon = next(h for h in (WINDOW, PLAIN, FREE_RUN, ONE_STEP) if h in each.simulated)
-    style, colour = LINES[horizon]
-    error = each.measured[name] - each.simulated[horizon][name]
+    style, colour = LINES[each.judged]
+    error = each.measured[name] - each.simulated[each.judged][name]
     time_s, error = thinned(each.time_s, factor * error)
-    axes.plot(time_s, error, linestyle=style, color=colour, linewidth=0.6, label=horizon)
+    noise = 2.0 * factor * each.noise[name].value
+    axes.axhspan(-noise, noise, color=GREY, alpha=0.5, linewidth=0, label="twice the noise")
+    label = f"error, {each.judged}"
+    axes.plot(time_s, error, linestyle=style, color=colour, linewidth=0.6, label=label)
+    axes.set_ylabel(f"error\n({display_unit(name)})")
+
+
+def _mark_worst(axes: Axes, each: RecordingComparison) -> None:
     for span in each.worst:
         axes.axvspan(span.start_s, span.end_s, color=ORANGE, alpha=0.35, linewidth=0)
-    axes.set_ylabel(f"error, {horizon} ({display_unit(name)})")
 
 
 def regime_figure(each: RecordingComparison) -> Figure:
     """Share of the error beside the share of the time, by regime."""
+    shown = each.by_regime[:SHOWN_REGIMES]
     with styled():
-        figure = new_figure(3.5, 0.8 + 0.28 * len(each.by_regime))
+        figure = new_figure(PAGE_IN / 1.5, 0.8 + 0.26 * len(shown))
         axes = figure.subplots()
-        rows = np.arange(len(each.by_regime))
-        error = [100.0 * regime.share_of_error for regime in each.by_regime]
-        time = [100.0 * regime.share_of_time for regime in each.by_regime]
-        axes.set_yticks(rows, [regime.name for regime in each.by_regime])
+        rows = np.arange(len(shown))
+        error = [100.0 * regime.share_of_error for regime in shown]
+        time = [100.0 * regime.share_of_time for regime in shown]
+        axes.set_yticks(rows, [regime.name for regime in shown])
         axes.barh(rows - 0.2, error, 0.38, color=RED, label="of the squared error")
         axes.barh(rows + 0.2, time, 0.38, color="0.75", hatch="////", label="of the time")
         axes.invert_yaxis()
+        axes.grid(False, axis="y")
         axes.set_xlabel("share (%)")
-        axes.set_title(f"{each.name}: where the error is")
+        axes.set_title(f"{each.name}: where the error is, {each.judged}")
         axes.legend()
     return figure

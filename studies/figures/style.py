@@ -19,6 +19,7 @@ from workbench.errors import whole_file
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.collections import QuadMesh
     from matplotlib.figure import Figure
 
 COLUMN_IN, PAGE_IN = 3.5, 7.16
@@ -110,10 +111,15 @@ def _write_drawn(figure: Figure, path: Path) -> None:
 
 
 def _curves(axes: Axes) -> Iterator[tuple[str, list, list]]:
-    """Label, x and y of each line, point cloud and group of bars."""
+    """Label, x and y of each line, cell of a map, point cloud and group of bars."""
     for line in axes.lines:
         yield str(line.get_label()), list(line.get_xdata()), list(line.get_ydata())
+    for mesh in axes.collections:
+        if hasattr(mesh, "get_coordinates"):
+            yield from _cells(mesh)
     for cloud in axes.collections:
+        if hasattr(cloud, "get_coordinates"):
+            continue
         points = np.ma.getdata(cloud.get_offsets())
         if len(points) > 1:
             yield str(cloud.get_label()), list(points[:, 0]), list(points[:, 1])
@@ -132,6 +138,15 @@ def _curves(axes: Axes) -> Iterator[tuple[str, list, list]]:
         ]
         nearest = [min(words, key=lambda at, m=m: abs(at - m), default=m) for m in middles]
         yield str(bars.get_label()), [words.get(at, at) for at in nearest], sizes
+
+
+def _cells(mesh: QuadMesh) -> Iterator[tuple[str, list, list]]:
+    """Value of each cell that is shown, and its middle."""
+    corners, values = np.asarray(mesh.get_coordinates()), np.ma.masked_invalid(mesh.get_array())
+    middles = (corners[1:, 1:] + corners[:-1, :-1]) / 2.0
+    for row, column in zip(*np.nonzero(~np.ma.getmaskarray(values)), strict=True):
+        x, y = middles[row, column]
+        yield f"{values[row, column]:.6g}", [x], [y]
 
 
 def _short(value: object) -> str:

@@ -1,10 +1,6 @@
-"""A plant against its recordings, over three horizons, because positions integrate.
+"""A plant against its recordings: errors by horizon and regime, worst windows, maps, residuals.
 
-one step    innovations of the extended Kalman filter: what is missed within one sample
-window      a fifth of a second with free start states: forces and flows stay visible, drift is cut
-free run    the whole recording from its first sample: what a user of a simulation feels
-
-A plant without states has one horizon, ``sample by sample``.
+The horizons are those of :mod:`workbench.comparison.horizons`.
 
 Source: diagnosis.md 1.1; the fit percent is that of System Identification:
 100 (1 - |y - yhat| / |y - mean y|).
@@ -17,23 +13,30 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from workbench.comparison.regimes import regimes, shares
-from workbench.filtering import filter_pass, recording_filter
+from workbench.comparison.course import Course, course_of
+from workbench.comparison.deviation import ShiftDeviation, shift_deviations
+from workbench.comparison.gear_shift import begins_energised
+from workbench.comparison.horizons import (
+    FREE_RUN,
+    JUDGED,
+    ONE_STEP,
+    PLAIN,
+    WINDOW,
+    Rows,
+    foretold,
+)
+from workbench.comparison.maps import ErrorMap, command_maps, motion_maps
+from workbench.comparison.noise import Noise, recorded_noise
+from workbench.comparison.regimes import regimes_of, shares
+from workbench.comparison.residuals import Residual, residual_of
 from workbench.fitting.errors import SignalError
-from workbench.fitting.noise import measured_noise
-from workbench.fitting.start_states import refit_starts
-from workbench.fitting.starts import guessed_states
-from workbench.fitting.windows import WINDOW_S, Windows, cut_windows
-from workbench.plant import Plant
+from workbench.fitting.windows import WINDOW_S
 from workbench.recording import Recording
 from workbench.rig import Rig
-from workbench.simulation import simulate
 
-ONE_STEP, WINDOW, FREE_RUN, PLAIN = "one step", "window", "free run", "sample by sample"
+__all__ = ["FREE_RUN", "ONE_STEP", "PLAIN", "WINDOW", "compare", "signal_error"]
+
 WORST = 3  # windows that are marked
-PROCESS_SHARE = 0.1  # of a state's scale per square root of a second, in the one-step filter
-
-Rows = Mapping[str, np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -68,6 +71,14 @@ class RecordingComparison:
         Windows with the largest error, worst first.
     measured, simulated
         Recorded outputs (n,) by full name, and what each horizon gives, NaN where nothing.
+    noise
+        By full output name, with where it is known from.
+    residuals
+        One-step errors by full output name; plain errors of a plant without states.
+    over_motion, over_command
+        Maps of the error over position and speed, and over command and pressure.
+    shifts
+        Gear shifts with the deviation measure of paper 003; none where there are no gears.
     notes
         What could not be done, in words.
     """
@@ -79,7 +90,17 @@ class RecordingComparison:
     worst: tuple[Span, ...]
     measured: Rows
     simulated: Mapping[str, Rows]
+    noise: Mapping[str, Noise]
+    residuals: Mapping[str, Residual]
+    over_motion: tuple[ErrorMap, ...] = ()
+    over_command: tuple[ErrorMap, ...] = ()
+    shifts: tuple[ShiftDeviation, ...] = ()
     notes: tuple[str, ...] = ()
+
+    @property
+    def judged(self) -> str:
+        """The horizon whose error regimes, worst windows and maps are of."""
+        return _first_of(JUDGED, self.simulated)
 
 
 @dataclass(frozen=True)
@@ -96,31 +117,36 @@ def compare(rig: Rig, recordings: Sequence[Recording]) -> Comparison:
 
 
 def _compared(rig: Rig, recording: Recording) -> RecordingComparison:
-    plant = rig.fit_for(recording).lean()
-    noise = _noise(recording, plant.measured)
+    course = course_of(rig.fit_for(recording), recording)
+    plant = course.plant
+    noise = recorded_noise(recording, plant.measured)
     measured = {name: recording[name] for name in plant.measured}
-    states = guessed_states(plant, recording)[0]
-    simulated, notes = _simulated(plant, recording, noise, states)
-    errors = {
-        horizon: {n: signal_error(measured[n], rows[n], noise[n]) for n in rows}
-        for horizon, rows in simulated.items()
-    }
-    horizon = next(name for name in (WINDOW, PLAIN, FREE_RUN, ONE_STEP) if name in simulated)
-    squared = _squared(measured, simulated[horizon])
-    chosen = regimes(plant, recording, states)
-    by_regime = tuple(
-        Regime(name, share, float(np.mean(chosen[name])))
-        for name, share in shares(chosen, squared).items()
-    )
+    simulated, notes = foretold(course, {name: each.value for name, each in noise.items()})
+    judged = simulated[_first_of(JUDGED, simulated)]
+    ahead = simulated[_first_of((ONE_STEP, PLAIN), simulated)]
+    errors = {name: measured[name] - judged[name] for name in measured}
+    shifts, more = _shifts(course)
+    squared = _squared(errors)
     return RecordingComparison(
         name=recording.name,
         time_s=recording.time_s,
-        errors=errors,
-        by_regime=by_regime,
+        errors={
+            horizon: {n: signal_error(measured[n], rows[n], noise[n].value) for n in rows}
+            for horizon, rows in simulated.items()
+        },
+        by_regime=_by_regime(course, squared),
         worst=_worst(squared, recording.sample_time_s),
         measured=measured,
         simulated=simulated,
-        notes=tuple(notes),
+        noise=noise,
+        residuals={
+            name: residual_of(recording, measured[name] - ahead[name], noise[name].value)
+            for name in measured
+        },
+        over_motion=motion_maps(course, errors),
+        over_command=command_maps(course, errors),
+        shifts=shifts,
+        notes=(*notes, *more, *filter(None, (each.sentence for each in noise.values()))),
     )
 
 
@@ -135,75 +161,33 @@ def signal_error(measured: np.ndarray, simulated: np.ndarray, noise: float) -> S
     return SignalError(float(np.sqrt(np.mean(error**2))), fit, noise)
 
 
-def _noise(recording: Recording, outputs: tuple[str, ...]) -> dict[str, float]:
-    """Noise by output; a channel that shows none counts a thousandth of its range."""
-    found = {}
-    for name in outputs:
-        try:
-            found |= measured_noise([recording], [name])
-        except ValueError:
-            span = float(np.nanmax(recording[name]) - np.nanmin(recording[name]))
-            found[name] = max(1e-3 * span, 1e-12)
-    return found
+def _first_of(wanted: Sequence[str], simulated: Mapping[str, Rows]) -> str:
+    return next(horizon for horizon in wanted if horizon in simulated)
 
 
-def _simulated(
-    plant: Plant, recording: Recording, noise: Mapping[str, float], states: np.ndarray
-) -> tuple[dict[str, Rows], list[str]]:
-    """Outputs by horizon, and what could not be done."""
-    if not plant.model.states:
-        return {PLAIN: _outputs(plant, simulate(plant, recording))}, []
-    found, notes = {ONE_STEP: _one_step(plant, recording, noise)}, []
+def _by_regime(course: Course, squared: np.ndarray) -> tuple[Regime, ...]:
+    chosen = regimes_of(course)
+    return tuple(
+        Regime(name, share, float(np.mean(chosen[name])))
+        for name, share in shares(chosen, squared).items()
+    )
+
+
+def _shifts(course: Course) -> tuple[tuple[ShiftDeviation, ...], list[str]]:
+    early = "the first shift began before the recording: its deviation is not known"
+    notes = [early] if begins_energised(course) else []
     try:
-        found[WINDOW] = _windows(cut_windows(plant, [recording], noise))
-    except ValueError as error:
-        notes.append(f"no windows: {error}")
-    try:
-        found[FREE_RUN] = _free_run(plant, recording, states)
+        return shift_deviations(course), notes
     except ArithmeticError as error:
-        notes.append(f"no free run: {error}")
-    return found, notes
+        return (), [*notes, f"no deviation of the shifts: {error}"]
 
 
-def _outputs(plant: Plant, recording: Recording) -> Rows:
-    return {name: recording[name] for name in plant.measured}
-
-
-def _one_step(plant: Plant, recording: Recording, noise: Mapping[str, float]) -> Rows:
-    """Measured minus innovation: the outputs foretold one sample before."""
-    process = dict(zip(plant.model.states, PROCESS_SHARE * plant.scale, strict=True))
-    known = recording_filter(plant, recording, measurement_noise=noise, process_noise=process)
-    found = filter_pass(known, recording)
-    rows = zip(found.measured, found.innovations, strict=True)
-    return {name: recording[name] - innovation for name, innovation in rows}
-
-
-def _windows(windows: Windows) -> Rows:
-    """Outputs of each window from its own start, (n,) with NaN outside of windows."""
-    fit = refit_starts(windows)
-    simulated = windows.measured - fit.residual * windows.scale[:, :, None]
-    recording, firsts = windows.recordings[0], windows.firsts[0]
-    rows = np.full((len(simulated), len(recording)), np.nan)
-    for k, first in enumerate(firsts):
-        rows[:, first : first + windows.length] = simulated[:, k]
-    return dict(zip(windows.plant.measured, rows, strict=True))
-
-
-def _free_run(plant: Plant, recording: Recording, states: np.ndarray) -> Rows:
-    """Outputs from the first sample of each piece to its end."""
-    pieces = [
-        _outputs(plant, simulate(plant, piece, states[:, first]))
-        for first, piece in zip(recording.starts, recording.pieces, strict=True)
-    ]
-    return {name: np.concatenate([piece[name] for piece in pieces]) for name in plant.measured}
-
-
-def _squared(measured: Rows, simulated: Rows) -> np.ndarray:
+def _squared(errors: Rows) -> np.ndarray:
     """Squared error with the same weight for every output, (n,); NaN where nothing is.
 
     In units of the noise a fine position sensor would outweigh every pressure.
     """
-    rows = np.array([(measured[name] - simulated[name]) ** 2 for name in measured])
+    rows = np.array([error**2 for error in errors.values()])
     seen = np.isfinite(rows)
     total = np.nansum(rows, axis=1, keepdims=True)
     weighted = np.where(seen, rows, 0.0) / np.maximum(total, 1e-300)

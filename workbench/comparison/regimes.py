@@ -1,6 +1,7 @@
-"""What a rig was doing at each sample of a recording: valve side, direction, rest, ends, reversal.
+"""What a rig was doing at each sample: valve, flow, motion, rest, ends, reversal, gear shift.
 
-Regimes overlap: a sample may be "at rest" and "valve closed" at once.
+Regimes overlap: a sample may be "at rest" and "valve closed" at once.  Those that a recording does
+not show are left out.
 """
 
 from __future__ import annotations
@@ -9,40 +10,36 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from workbench.effects.forces import EndStops
+from workbench.comparison.course import Course, course_of
+from workbench.comparison.gear_shift import phases
+from workbench.comparison.motion import motion
 from workbench.fitting.gauss_newton import Fit
-from workbench.fitting.starts import bridged, guessed_states, slope
-from workbench.plant import Plant
+from workbench.fitting.starts import guessed_states
+from workbench.plant import Plant, Signal
 from workbench.recording import Recording
-from workbench.simulation import inputs
-from workbench.units import display_unit
+from workbench.units import display_scale, display_unit
 
-RESTING_M_S = 5e-3
-NEAR_SHARE = 0.1  # of the stroke at each end
-REVERSAL_S = 0.05  # on either side of a change of direction
 OPEN_SHARE = 1e-3  # of the range of a command, behind the dead zone
+NEAR_NULL_SHARE = 0.02  # likewise
+CARRYING_SHARE = 0.1  # of the largest flow of the recording
+CHOKED = 1.0 - 1e-6  # of the choked flow; rounding takes less, and 0.001 of the ratio no more
 
 
-def regimes(
-    plant: Plant, recording: Recording, states: np.ndarray | None = None
-) -> dict[str, np.ndarray]:
+def regimes(plant: Plant, recording: Recording) -> dict[str, np.ndarray]:
     """Which samples belong to each regime, shape (n,) each; only those that the channels show.
 
-    The valve side is that of the command as the valve gets it, behind offset and dead zone;
-    ``states`` (n_x, n) are guessed from the recording if not given.
+    The plant comes with what is absent in it, or without.
     """
-    found: dict[str, np.ndarray] = {}
-    for signal, command in _commands(plant, recording, states).items():
-        member = signal.rpartition(".")[0]
-        closed, size = _closed(plant, signal)
-        away = command - closed
-        found[f"{member} closed"] = np.abs(away) <= size
-        centre = f"{closed:.4g} {display_unit(signal)}".strip()
-        found[f"{member} open above {centre}"] = away > size
-        found[f"{member} open below {centre}"] = away < -size
-    place = _position(plant, recording)
-    if place is not None:
-        found |= _motion(plant, recording, place)
+    return regimes_of(course_of(plant, recording))
+
+
+def regimes_of(course: Course) -> dict[str, np.ndarray]:
+    """The same for a course that is known already."""
+    found = _valve_sides(course) | _flows(course) | phases(course)
+    several = len(course.places) > 1
+    for place in course.places:
+        own = motion(course, place)
+        found |= {f"{place.member} {name}": each for name, each in own.items()} if several else own
     return {name: samples for name, samples in found.items() if samples.any()}
 
 
@@ -70,69 +67,65 @@ def regime_shares(fit: Fit) -> dict[str, float]:
         for k, first in enumerate(firsts, start=done):
             squared[first : first + windows.length] = squares[k]
         done += len(firsts)
-        for name, samples in regimes(plant, recording).items():
+        states = guessed_states(plant, recording)[0]
+        course = Course(fit.plant, plant, recording, states)
+        for name, samples in regimes_of(course).items():
             sums[name] = sums.get(name, 0.0) + float(np.nansum(squared[samples]))
     total = float(squares.sum())
     found = {name: part / total if total > 0 else 0.0 for name, part in sums.items()}
     return dict(sorted(found.items(), key=lambda item: -item[1]))
 
 
-def _commands(
-    plant: Plant, recording: Recording, states: np.ndarray | None
-) -> dict[str, np.ndarray]:
-    """Each command behind all that alters it, shape (n,)."""
-    model = plant.model
-    if not model.commands:
-        return {}
-    u, d = inputs(plant, recording)
-    x, p = guessed_states(plant, recording)[0] if states is None else states, plant.nominal[2]
-    values = model.quantities(*model.commands).map(len(recording))(x, u, d, p).full()
-    return dict(zip(model.commands, values, strict=True))
+def _valve_sides(course: Course) -> dict[str, np.ndarray]:
+    """Sides of each command as it arrives behind all that alters it, dead zone included."""
+    plant = course.plant
+    arriving = (plant.model.conditions.read(signal.name) for signal in plant.commands)
+    found: dict[str, np.ndarray] = {}
+    for signal, command in zip(plant.commands, course.along(*arriving), strict=True):
+        found |= _sides(signal, command, _moves_gas(plant, signal))
+    return found
 
 
-def _closed(plant: Plant, command: str) -> tuple[float, float]:
-    """The value at which a command opens nothing, and how far off is still closed."""
-    signal = next(s for s in plant.commands if s.name == command)
+def _sides(signal: Signal, command: np.ndarray, valve: bool) -> dict[str, np.ndarray]:
+    member = signal.name.rpartition(".")[0]
+    away = command - signal.nominal
     span = signal.upper - signal.lower
-    return signal.nominal, OPEN_SHARE * (span if np.isfinite(span) else 1.0)
-
-
-def _position(plant: Plant, recording: Recording) -> str | None:
-    """The recorded position, if there is one."""
-    names = (*plant.measured, *(s.name for s in plant.measured_inputs))
-    found = [n for n in names if n.endswith("position_m") and n in recording.channels]
-    return found[0] if found else None
-
-
-def _motion(plant: Plant, recording: Recording, place: str) -> dict[str, np.ndarray]:
-    position_m = bridged(recording[place], recording.starts)
-    velocity_m_s = slope(position_m, recording.sample_time_s, recording.starts)
-    moving = np.where(np.abs(velocity_m_s) < RESTING_M_S, 0.0, np.sign(velocity_m_s))
-    low_m, high_m = _stroke(plant, position_m)
-    near_m = NEAR_SHARE * (high_m - low_m)
+    closed = OPEN_SHARE * (span if np.isfinite(span) else 1.0)
+    if signal.levels:
+        return {f"{member} energised": away > closed, f"{member} released": away <= closed}
+    unit, to_people = display_unit(signal.name), display_scale(signal.name).from_si
+    centre = f"{to_people(signal.nominal):.4g} {unit}".strip()
+    sides = {f"above {centre}": away > closed, f"below {centre}": away < -closed}
+    if not valve:
+        return {f"{member} {side}": samples for side, samples in sides.items()}
+    near = (np.abs(away) > closed) & (np.abs(away) <= NEAR_NULL_SHARE * span)
     return {
-        "at rest": moving == 0.0,
-        "moving forward": moving > 0.0,
-        "moving backward": moving < 0.0,
-        "near the ends": (position_m < low_m + near_m) | (position_m > high_m - near_m),
-        "reversal": _reversals(moving, round(REVERSAL_S / recording.sample_time_s)),
+        f"{member} closed": np.abs(away) <= closed,
+        f"{member} near null": near,
+        **{f"{member} open {side}": samples for side, samples in sides.items()},
     }
 
 
-def _stroke(plant: Plant, position_m: np.ndarray) -> tuple[float, float]:
-    """The stops, or the recorded range where the plant has none."""
-    stops = [effect for effect in plant.effects if isinstance(effect, EndStops)]
-    if stops:
-        return float(stops[0].lower_m), float(stops[0].upper_m)
-    return float(np.nanmin(position_m)), float(np.nanmax(position_m))
+def _moves_gas(plant: Plant, signal: Signal) -> bool:
+    """True where a command goes to what fills or vents something."""
+    member = signal.name.rpartition(".")[0]
+    kinds = {kind for effect, kind, _ in plant.model.flows if effect == member}
+    return bool(kinds & {"MassFlow", "PressureRate"})
 
 
-def _reversals(moving: np.ndarray, around: int) -> np.ndarray:
-    """Samples near a change of direction, rests between two directions passed over, shape (n,)."""
-    last = np.maximum.accumulate(np.where(moving != 0, np.arange(len(moving)), 0))
-    direction = moving[last]
-    turns = np.flatnonzero(direction[1:] * direction[:-1] < 0) + 1
-    near = np.zeros(len(moving), dtype=bool)
-    for turn in turns:
-        near[max(turn - around, 0) : turn + around] = True
-    return near
+def _flows(course: Course) -> dict[str, np.ndarray]:
+    """Choked or subsonic, for each path and direction while it carries flow."""
+    paths = course.plant.model.paths
+    flows = course.along(*(path.flow_kg_s for path in paths))
+    shares_of_choked = course.along(*(path.choked_share for path in paths))
+    if not flows.size:
+        return {}
+    least = CARRYING_SHARE * float(np.nanmax(np.abs(flows)))
+    found: dict[str, np.ndarray] = {}
+    for path, flow, share in zip(paths, flows, shares_of_choked, strict=True):
+        for way, carrying in (("into", flow > least), ("out of", flow < -least)):
+            name = f"{path.effect} {way} {path.balance}"
+            for state, holds in (("choked", share >= CHOKED), ("subsonic", share < CHOKED)):
+                key = f"{name} {state}"
+                found[key] = found.get(key, np.zeros(len(flow), dtype=bool)) | (carrying & holds)
+    return found

@@ -172,9 +172,9 @@ class FivePortValve(Effect):
         vent = path_between(gas, outside)
         into_kg_s = gas.line_share * self._flow_kg_s(charge, charging_m2, inlet, +1)
         out_kg_s = gas.line_share * self._flow_kg_s(vent, exhausting_m2, outlet, -1)
-        yield MassFlow(chamber, into_kg_s, charge.temperature_k)
+        yield MassFlow(chamber, into_kg_s, charge.temperature_k, inlet(charge.ratio))
         yield MassFlow("supply", -into_kg_s, charge.temperature_k)
-        yield MassFlow(chamber, -out_kg_s, vent.temperature_k)
+        yield MassFlow(chamber, -out_kg_s, vent.temperature_k, outlet(vent.ratio))
 
     def _flow_kg_s(self, path: Path, area_m2: Expression, law: FlowLaw, side: int) -> Expression:
         """Flow through the controlled hole and through the closed-centre leak beside it.

@@ -37,7 +37,7 @@ class ChamberLeak(Effect):
         gas, outside = now[self.chamber], now["atmosphere"]
         path = path_between(gas, outside)
         lost_kg_s = path.flow_kg_s(self.area_m2, NozzleLaw())
-        yield MassFlow(self.chamber, -lost_kg_s, path.temperature_k)
+        yield MassFlow(self.chamber, -lost_kg_s, path.temperature_k, NozzleLaw()(path.ratio))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,5 +65,5 @@ class PistonLeak(Effect):
     def terms(self, now: Conditions) -> Iterator[MassFlow]:
         path = path_between(now[self.first], now[self.second])
         crossing_kg_s = path.flow_kg_s(self.area_m2, NozzleLaw())
-        yield MassFlow(self.first, -crossing_kg_s, path.temperature_k)
+        yield MassFlow(self.first, -crossing_kg_s, path.temperature_k, NozzleLaw()(path.ratio))
         yield MassFlow(self.second, crossing_kg_s, path.temperature_k)

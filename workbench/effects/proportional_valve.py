@@ -59,7 +59,7 @@ class InputPressure:
         path = Path(*ends, valve.gas_constant_j_kg_k)
         hole_m2 = valve.equivalent_area_m2(offset_v)
         into_kg_s = gas.line_share * path.flow_kg_s(hole_m2, NozzleLaw())
-        yield MassFlow(chamber, into_kg_s, path.temperature_k)
+        yield MassFlow(chamber, into_kg_s, path.temperature_k, NozzleLaw()(path.ratio))
         yield MassFlow("supply", -share * into_kg_s, path.temperature_k)
 
 
@@ -226,6 +226,6 @@ class ProportionalValve(Effect):
         vent = path_between(gas, now["atmosphere"])
         into_kg_s = gas.line_share * charge.flow_kg_s(supplied_m2, NozzleLaw())
         out_kg_s = gas.line_share * vent.flow_kg_s(vented_m2, NozzleLaw())
-        yield MassFlow(chamber, into_kg_s, charge.temperature_k)
+        yield MassFlow(chamber, into_kg_s, charge.temperature_k, NozzleLaw()(charge.ratio))
         yield MassFlow("supply", -into_kg_s, charge.temperature_k)
-        yield MassFlow(chamber, -out_kg_s, vent.temperature_k)
+        yield MassFlow(chamber, -out_kg_s, vent.temperature_k, NozzleLaw()(vent.ratio))

@@ -151,9 +151,9 @@ class SolenoidValve(Effect):
         outlet_m2 *= (1.0 - self.discharge_asymmetry) * (1.0 - self.exhaust_restriction_share)
         into_kg_s = gas.line_share * self._flow_kg_s(charge, inlet_m2)
         out_kg_s = gas.line_share * self._flow_kg_s(vent, outlet_m2)
-        yield MassFlow(self.chamber, into_kg_s, charge.temperature_k)
+        yield MassFlow(self.chamber, into_kg_s, charge.temperature_k, NozzleLaw()(charge.ratio))
         yield MassFlow("supply", -into_kg_s, charge.temperature_k)
-        yield MassFlow(self.chamber, -out_kg_s, vent.temperature_k)
+        yield MassFlow(self.chamber, -out_kg_s, vent.temperature_k, NozzleLaw()(vent.ratio))
 
     def _flow_kg_s(self, path: Path, seat_m2: Expression) -> Expression:
         """Flow through a seat and through the leak beside it."""

@@ -184,19 +184,22 @@ class ThreePortValve(SpoolOpening):
         out_kg_s = gas.line_share * self._flow(
             outlet, vent * (1.0 - self.exhaust_restriction_share), -1
         )
-        yield MassFlow(self.chamber, into_kg_s, charge.temperature_k)
+        yield MassFlow(self.chamber, into_kg_s, charge.temperature_k, self._law(charge))
         yield MassFlow("supply", -into_kg_s, charge.temperature_k)
-        yield MassFlow(self.chamber, -out_kg_s, outlet.temperature_k)
+        yield MassFlow(self.chamber, -out_kg_s, outlet.temperature_k, self._law(outlet))
 
     def _flow(self, path: Path, share: Expression, side: int) -> Expression:
         """Flow along a path; ``side`` is +1 where its forward direction enters the chamber."""
         entering = side * (2.0 * path.forward - 1.0)
-        nozzle = NozzleLaw()(path.ratio)
-        iso = IsoLaw(self.critical_ratio)(path.ratio)
-        law = nozzle + self.iso_share * (iso - nozzle)
         effective = self.discharge_coefficient * (1.0 + self.discharge_asymmetry * entering)
-        holes_m2 = effective * self.flow_area_m2 * share * law + self.leak_area_m2 * nozzle
+        leaking_m2 = self.leak_area_m2 * NozzleLaw()(path.ratio)
+        holes_m2 = effective * self.flow_area_m2 * share * self._law(path) + leaking_m2
         return holes_m2 * path.choked_kg_s_m2
+
+    def _law(self, path: Path) -> Expression:
+        """Flow over the choked flow: between the nozzle's and that of ISO 6358."""
+        nozzle = NozzleLaw()(path.ratio)
+        return nozzle + self.iso_share * (IsoLaw(self.critical_ratio)(path.ratio) - nozzle)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -87,13 +87,21 @@ def long_holes(plant: Plant, recording: Recording) -> np.ndarray:
     return blind
 
 
-def slope(values: np.ndarray, sample_time_s: float, starts: tuple[int, ...]) -> np.ndarray:
-    """Rate of a recorded channel by a moving parabola inside each piece, shape (n,)."""
+def slope(
+    values: np.ndarray,
+    sample_time_s: float,
+    starts: tuple[int, ...],
+    samples: int = SMOOTHING_SAMPLES,
+) -> np.ndarray:
+    """Rate of a recorded channel by a moving parabola inside each piece, shape (n,).
+
+    ``samples`` is the odd length of the parabola.
+    """
     from scipy.signal import savgol_filter
 
     rate = np.zeros(len(values))
     for first, last in zip(starts, (*starts[1:], len(values)), strict=True):
-        width = min(SMOOTHING_SAMPLES, (last - first - 1) // 2 * 2 + 1)
+        width = min(samples, (last - first - 1) // 2 * 2 + 1)
         if width >= 3:
             rate[first:last] = savgol_filter(
                 np.nan_to_num(values[first:last]), width, 2, deriv=1, delta=sample_time_s

@@ -1,0 +1,89 @@
+"""Comparisons as text: errors by horizon, where they are, and gear shifts as in paper 003."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from studies.text import columns, number, percent, shown
+from workbench.units import public_name
+
+if TYPE_CHECKING:
+    from workbench.comparison.compare import Comparison, RecordingComparison, Regime
+    from workbench.comparison.deviation import ShiftDeviation
+
+SHOWN_REGIMES = 20
+
+
+def comparison_text(found: Comparison) -> str:
+    """Errors by horizon, regimes, worst windows and gear shifts of each recording."""
+    return "\n\n".join(_recording_text(each) for each in found.recordings)
+
+
+def _recording_text(each: RecordingComparison) -> str:
+    worst = ", ".join(
+        f"{span.start_s:.2f} to {span.end_s:.2f} s ({percent(span.share_of_error, 1)})"
+        for span in each.worst
+    )
+    parts = [
+        f"{each.name}: {each.time_s[-1]:.4g} s",
+        _errors(each),
+        _regimes(each.by_regime),
+        f"worst: {worst}" if worst else "",
+        shifts_text(each.shifts),
+        *each.notes,
+    ]
+    return "\n".join(filter(None, parts))
+
+
+def _errors(each: RecordingComparison) -> str:
+    return columns(
+        ("signal", "horizon", "RMSE", "fit %", "noise"),
+        [
+            (
+                public_name(name),
+                horizon,
+                shown(error.rmse, name),
+                number(error.fit_percent, 3),
+                shown(error.noise, name, 2),
+            )
+            for name in each.measured
+            for horizon, row in each.errors.items()
+            if (error := row.get(name))
+        ],
+    )
+
+
+def _regimes(found: Sequence[Regime]) -> str:
+    rows = [(r.name, percent(r.share_of_error), percent(r.share_of_time)) for r in found]
+    rest = len(rows) - SHOWN_REGIMES
+    more = f"\n... and {rest} more, in the JSON" if rest > 0 else ""
+    head = ("where the error is", "of the error", "of the time")
+    return columns(head, rows[:SHOWN_REGIMES]) + more
+
+
+def shifts_text(found: Sequence[ShiftDeviation]) -> str:
+    """Table I of paper 003: deviation of each output for each shift, and the mean."""
+    if not found:
+        return ""
+    outputs = list(found[0].deviations)
+    rows = [
+        (
+            shift.case,
+            f"{shift.start_s:.3f} s",
+            f"{1e3 * (shift.end_s - shift.start_s):.1f} ms",
+            *(percent(shift.deviations[name], 2) for name in outputs),
+        )
+        for shift in found
+    ]
+    means = [_mean([shift.deviations[name] for shift in found]) for name in outputs]
+    rows.append(("mean", "-", "-", *(percent(mean, 2) for mean in means)))
+    head = ("deviation of the shift", "from", "takes", *map(public_name, outputs))
+    return columns(head, rows)
+
+
+def _mean(values: Sequence[float]) -> float:
+    known = [value for value in values if np.isfinite(value)]
+    return sum(known) / len(known) if known else float("nan")

@@ -1,0 +1,164 @@
+"""A gear shift in a recording: its phases, and from where to where it went.
+
+The detent has a notch every pitch of the lever's tip and pulls back hardest a quarter of a pitch
+away from one; the synchroniser blocks between two distances from Neutral on the way out.  With x
+the position of the body that moves the lever, and a notch's reach a quarter of the pitch:
+
+in neutral, in gear     within reach of a notch, from the first rest there to the last
+release                 within reach, from the last rest on
+engaging                within reach, before the first rest
+synchronising           in the synchroniser's zone, on the way from Neutral
+travel                  all else
+
+The geometry is the plant's own and holds where the effect itself is absent, because a recording may
+show what the model lacks.
+
+Source: physics.md 2.5 and 6 (detent, synchroniser).  The reach is *chosen*: the papers name no
+phases.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from workbench.comparison.course import Course, Place
+from workbench.effects.detent import Detent
+from workbench.effects.synchroniser import Synchroniser
+from workbench.lever import Lever
+
+REACH = 1.0 / 4.0  # of the pitch, on either side of a notch
+REACHED = 1.0 / 24.0  # of the pitch: half a millimetre, which friction leaves to the detent
+GEARS = {-1: "L", 0: "N", 1: "H"}
+BETWEEN = 99  # no notch
+
+
+@dataclass(frozen=True, eq=False)
+class Gears:
+    """The gears of a plant: who moves, how far the notches lie apart, where speeds are matched."""
+
+    place: Place
+    pitch_m: float
+    zone_m: tuple[float, float] | None
+
+
+@dataclass(frozen=True)
+class Shift:
+    """From the sample at which the commands change to the one at which the gear is reached."""
+
+    case: str
+    first: int
+    last: int
+
+
+def gears_of(course: Course) -> Gears | None:
+    """The gears; None where the plant has no detent or the position was not recorded."""
+    members = course.whole.members
+    detent = next((m for m in members if isinstance(m, Detent)), None)
+    if detent is None:
+        return None
+    lever = next(m for m in members if m.name == detent.lever)
+    moved = f"{lever.tip_body}.position_m" if isinstance(lever, Lever) else ""
+    place = next((p for p in course.places if p.name == moved), None)
+    if place is None:
+        return None
+    gate = next((m for m in members if isinstance(m, Synchroniser)), None)
+    zone_m = (float(gate.start_m), float(gate.end_m)) if gate else None
+    return Gears(place, float(detent.pitch_m), zone_m)
+
+
+def phases(course: Course) -> dict[str, np.ndarray]:
+    """Which samples belong to each phase, shape (n,) each; they part the time."""
+    gears = gears_of(course)
+    if gears is None:
+        return {}
+    x, moving = gears.place.value, gears.place.moving
+    notch = _notch(x, gears.pitch_m, REACH)
+    names = ("in neutral", "in gear", "release", "engaging", "synchronising", "travel")
+    found = {name: np.zeros(len(x), dtype=bool) for name in names}
+    for first, last in _visits(notch, course.recording.starts):
+        rest = np.flatnonzero(moving[first:last] == 0) + first
+        if not len(rest):
+            continue
+        held = "in neutral" if notch[first] == 0 else "in gear"
+        found["engaging"][first : rest[0]] = True
+        found[held][rest[0] : rest[-1] + 1] = True
+        found["release"][rest[-1] + 1 : last] = True
+    rest_of = ~np.any([*found.values()], axis=0)
+    if gears.zone_m:
+        within = (np.abs(x) >= gears.zone_m[0]) & (np.abs(x) <= gears.zone_m[1])
+        found["synchronising"] = within & rest_of & (_last_notch(notch) == 0)
+    found["travel"] = rest_of & ~found["synchronising"]
+    return found
+
+
+def shifts(course: Course) -> tuple[Shift, ...]:
+    """Every change of the commands after which another gear was reached.
+
+    Where a piece begins with energised valves it is not known since when they are.
+    """
+    gears, on = gears_of(course), _energised(course)
+    if gears is None or not len(on):
+        return ()
+    changed = np.flatnonzero(np.any(on[:, 1:] != on[:, :-1], axis=0)) + 1
+    found = []
+    for begin, end in pairwise((*course.recording.starts, on.shape[1])):
+        inside = [int(k) for k in changed if begin < k < end]
+        for first, until in pairwise((*inside, end)):
+            waiting = next((k for k in inside if k > first and on[:, k].any()), end)
+            if on[:, first].any():
+                found.append(_shift(gears, first, until, waiting))
+    return tuple(shift for shift in found if shift)
+
+
+def begins_energised(course: Course) -> bool:
+    """True where a shift may have begun before the recording did."""
+    on = _energised(course)
+    return gears_of(course) is not None and bool(on.size and on[:, 0].any())
+
+
+def _shift(gears: Gears, first: int, until: int, waiting: int) -> Shift | None:
+    """The shift that began at ``first``, ended by the next change, or else by the next energising.
+
+    The gear is reached where the position enters its neighbourhood for good.
+    """
+    for end in (until, waiting):
+        near = _notch(gears.place.value[first:end], gears.pitch_m, REACHED)
+        if near[-1] != BETWEEN:
+            break
+    origin = round(float(gears.place.value[first]) / gears.pitch_m)
+    target = round(float(gears.place.value[end - 1]) / gears.pitch_m)
+    if origin == target:
+        return None
+    outside = np.flatnonzero(near != target)
+    last = min(first + int(outside[-1]) + 1, end - 1)
+    names = (GEARS.get(gear, f"{gear:+d}") for gear in (origin, target))
+    return Shift(" to ".join(names), first, last)
+
+
+def _energised(course: Course) -> np.ndarray:
+    """Which switched commands are on, shape (n_switched, n)."""
+    switched = [signal for signal in course.plant.commands if signal.levels]
+    rows = [course.recording[s.name] > sum(s.levels) / len(s.levels) for s in switched]
+    return np.array(rows, dtype=bool).reshape(len(rows), len(course.recording))
+
+
+def _notch(position_m: np.ndarray, pitch_m: float, share: float) -> np.ndarray:
+    """Number of the notch within that share of the pitch, ``BETWEEN`` where there is none, (n,)."""
+    nearest = np.round(position_m / pitch_m)
+    near = np.abs(position_m - nearest * pitch_m) <= share * pitch_m
+    return np.where(near, nearest, BETWEEN).astype(int)
+
+
+def _visits(notch: np.ndarray, starts: tuple[int, ...]) -> list[tuple[int, int]]:
+    """First sample and the one behind the last of each stay at a notch."""
+    edges = {0, len(notch), *starts, *(np.flatnonzero(np.diff(notch)) + 1).tolist()}
+    return [(a, b) for a, b in pairwise(sorted(edges)) if notch[a] != BETWEEN]
+
+
+def _last_notch(notch: np.ndarray) -> np.ndarray:
+    """The notch last visited, ``BETWEEN`` before the first, shape (n,)."""
+    visited = np.where(notch != BETWEEN, np.arange(len(notch)), 0)
+    return notch[np.maximum.accumulate(visited)]

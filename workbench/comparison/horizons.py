@@ -1,0 +1,93 @@
+"""What a plant foretells of a recording, over three horizons, because positions integrate.
+
+one step    innovations of the extended Kalman filter: what is missed within one sample
+window      a fifth of a second with free start states: forces and flows stay visible, drift is cut
+free run    the whole recording from its first sample: what a user of a simulation feels
+
+A plant without states has one horizon, ``sample by sample``.
+
+Source: diagnosis.md 1.1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from workbench.comparison.course import Course
+from workbench.filtering import filter_pass, recording_filter
+from workbench.fitting.start_states import refit_starts
+from workbench.fitting.windows import Windows, cut_windows
+from workbench.plant import Plant
+from workbench.recording import Recording
+from workbench.simulation import simulate
+
+ONE_STEP, WINDOW, FREE_RUN, PLAIN = "one step", "window", "free run", "sample by sample"
+JUDGED = (WINDOW, PLAIN, FREE_RUN, ONE_STEP)  # the first there is tells where the error is
+PROCESS_SHARE = 0.1  # of a state's scale per square root of a second, in the one-step filter
+
+Rows = Mapping[str, np.ndarray]
+
+
+def foretold(course: Course, noise: Mapping[str, float]) -> tuple[dict[str, Rows], list[str]]:
+    """Outputs (n,) by horizon and full name, NaN where nothing; and what could not be done."""
+    plant, recording = course.plant, course.recording
+    if not plant.model.states:
+        return {PLAIN: _outputs(plant, simulate(plant, recording))}, []
+    found = {ONE_STEP: _one_step(plant, recording, noise)}
+    notes = lost(recording, found[ONE_STEP])
+    try:
+        found[WINDOW] = _windows(cut_windows(plant, [recording], noise))
+    except ValueError as error:
+        notes.append(f"no windows: {error}")
+    try:
+        found[FREE_RUN] = _free_run(course)
+    except ArithmeticError as error:
+        notes.append(f"no free run: {error}")
+    return found, notes
+
+
+def lost(recording: Recording, ahead: Rows) -> list[str]:
+    """From when on the one-step filter gave no numbers, in words."""
+    recorded = np.isfinite(recording.rows(ahead)).any(axis=0)
+    missing = np.flatnonzero(recorded & ~np.isfinite([*ahead.values()]).any(axis=0))
+    if not len(missing):
+        return []
+    share, start_s = len(missing) / recorded.sum(), recording.sample_time_s * missing[0]
+    told = f"{100 * share:.0f} % of the samples, the first at {start_s:.4g} s"
+    return [f"one step: the filter gave nothing for {told}"]
+
+
+def _outputs(plant: Plant, recording: Recording) -> Rows:
+    return {name: recording[name] for name in plant.measured}
+
+
+def _one_step(plant: Plant, recording: Recording, noise: Mapping[str, float]) -> Rows:
+    """Measured minus innovation: the outputs foretold one sample before."""
+    process = dict(zip(plant.model.states, PROCESS_SHARE * plant.scale, strict=True))
+    known = recording_filter(plant, recording, measurement_noise=noise, process_noise=process)
+    found = filter_pass(known, recording)
+    rows = zip(found.measured, found.innovations, strict=True)
+    return {name: recording[name] - innovation for name, innovation in rows}
+
+
+def _windows(windows: Windows) -> Rows:
+    """Outputs of each window from its own start, (n,) with NaN outside of windows."""
+    fit = refit_starts(windows)
+    simulated = windows.measured - fit.residual * windows.scale[:, :, None]
+    recording, firsts = windows.recordings[0], windows.firsts[0]
+    rows = np.full((len(simulated), len(recording)), np.nan)
+    for k, first in enumerate(firsts):
+        rows[:, first : first + windows.length] = simulated[:, k]
+    return dict(zip(windows.plant.measured, rows, strict=True))
+
+
+def _free_run(course: Course) -> Rows:
+    """Outputs from the first sample of each piece to its end."""
+    plant, recording = course.plant, course.recording
+    pieces = [
+        _outputs(plant, simulate(plant, piece, course.states[:, first]))
+        for first, piece in zip(recording.starts, recording.pieces, strict=True)
+    ]
+    return {name: np.concatenate([piece[name] for piece in pieces]) for name in plant.measured}

@@ -1,0 +1,116 @@
+"""What is left of a signal: its spectrum, and whether it is white.
+
+The innovations of a one-step filter are white where plant and noise are right.  Then their
+autocorrelation stays within +-1.96/sqrt(n) in 95 % of all lags and their spectrum is flat, at
+2 sigma^2 dt for one side.
+
+Source: Ljung, System Identification, 2nd ed., 16.6 (residual analysis); Welch 1967 (spectrum).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from workbench.recording import Recording
+
+LONGEST_LAG_S = 0.1
+LAGS = 50, 200  # fewest and most
+LONGEST_SEGMENT = 2048
+SEGMENTS = 8  # at least so many, half over each other
+NORMAL_95 = 1.96
+
+
+@dataclass(frozen=True)
+class Residual:
+    """One output's one-step error, or plain error of a plant without states.
+
+    Attributes
+    ----------
+    frequency_hz, density
+        One-sided spectral density in the square of the output's SI unit per hertz, (n_f,).
+    lag_s, correlation
+        Autocorrelation from lag 0 on, (n_lags,).
+    band
+        Half width that 95 % of the lags of white noise keep.
+    floor
+        Density of the noise alone.
+    """
+
+    frequency_hz: np.ndarray
+    density: np.ndarray
+    lag_s: np.ndarray
+    correlation: np.ndarray
+    band: float
+    floor: float
+
+    @property
+    def outside(self) -> float:
+        """Share of the lags outside the band; 0.05 is chance.  NaN where nothing is known."""
+        lags = self.correlation[1:]
+        return float(np.mean(np.abs(lags) > self.band)) if len(lags) else float("nan")
+
+
+def residual_of(recording: Recording, error: np.ndarray, noise: float) -> Residual:
+    """Spectrum and autocorrelation of an error (n,), NaN where there is none."""
+    dt = recording.sample_time_s
+    stretches = [*_stretches(recording, error)]
+    frequency_hz, density = spectrum(stretches, dt)
+    correlation, count = autocorrelation(stretches, _lags(dt, stretches))
+    return Residual(
+        frequency_hz=frequency_hz,
+        density=density,
+        lag_s=dt * np.arange(len(correlation)),
+        correlation=correlation,
+        band=NORMAL_95 / np.sqrt(max(count, 1)),
+        floor=2.0 * noise**2 * dt,
+    )
+
+
+def spectrum(stretches: list[np.ndarray], sample_time_s: float) -> tuple[np.ndarray, np.ndarray]:
+    """Frequencies and one-sided density by Welch's method over all stretches, (n_f,) each.
+
+    Stretches shorter than a segment are left out.
+    """
+    from scipy.signal import welch
+
+    longest = max(map(len, stretches), default=0)
+    segment = min(LONGEST_SEGMENT, 2 * longest // SEGMENTS)
+    if segment < SEGMENTS:
+        return np.zeros(0), np.zeros(0)
+    used = [each for each in stretches if len(each) >= segment]
+    found = [welch(each, 1.0 / sample_time_s, nperseg=segment) for each in used]
+    weights = [len(each) for each in used]
+    return found[0][0], np.average([density for _, density in found], axis=0, weights=weights)
+
+
+def autocorrelation(stretches: list[np.ndarray], lags: int) -> tuple[np.ndarray, int]:
+    """Correlation of values so many samples apart, (lags + 1,), and how many values there are.
+
+    Only pairs within one stretch count; empty where nothing varies.
+    """
+    count = sum(map(len, stretches))
+    mean = sum(float(each.sum()) for each in stretches) / max(count, 1)
+    free = [each - mean for each in stretches]
+    sums = np.zeros(lags + 1)
+    for each in free:
+        most = min(lags + 1, len(each))
+        sums[:most] += [float(each[: len(each) - k] @ each[k:]) for k in range(most)]
+    return (sums / sums[0] if sums[0] > 0 else np.zeros(0)), count
+
+
+def _lags(sample_time_s: float, stretches: list[np.ndarray]) -> int:
+    wanted = min(max(round(LONGEST_LAG_S / sample_time_s), LAGS[0]), LAGS[1])
+    return min(wanted, max(map(len, stretches), default=1) - 1)
+
+
+def _stretches(recording: Recording, error: np.ndarray) -> Iterator[np.ndarray]:
+    """The error between holes and ends of pieces."""
+    for first, piece in zip(recording.starts, recording.pieces, strict=True):
+        inside = error[first : first + len(piece)]
+        edges = np.flatnonzero(np.diff(np.isfinite(inside))) + 1
+        for part in np.split(inside, edges):
+            if len(part) and np.isfinite(part[0]):
+                yield part
