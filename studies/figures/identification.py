@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import singledispatch
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,14 +33,7 @@ PA_PER_BAR = 1e5
 GOAL_BAR = 0.04  # what paper 002 reports
 
 
-@singledispatch
-def identification_figures(found: Identified) -> dict[str, Figure]:
-    """The figure of a result, by file name."""
-    raise TypeError(f"no figure for {type(found).__name__}")
-
-
-@identification_figures.register
-def _(found: FlowFit) -> dict[str, Figure]:
+def flow_figure(found: FlowFit) -> Figure:
     """Tank curves with their fits, area over command, and MAE over command."""
     with styled():
         figure = new_figure(PAGE_IN, 4.6)
@@ -72,15 +65,14 @@ def _(found: FlowFit) -> dict[str, Figure]:
         axes.legend()
         for axes in panels[1]:
             axes.set_xlabel("command (V)")
-    return {"flow": figure}
+    return figure
 
 
 def _command(row: tuple) -> float:
     return row[0].command_v
 
 
-@identification_figures.register
-def _(found: DeadZoneLimits) -> dict[str, Figure]:
+def dead_zone_figure(found: DeadZoneLimits) -> Figure:
     """Pressure over command with the fitted limits."""
     with styled():
         figure = new_figure(COLUMN_IN, 2.6)
@@ -95,11 +87,10 @@ def _(found: DeadZoneLimits) -> dict[str, Figure]:
         axes.set_xlabel("command (V)")
         axes.set_ylabel("reservoir pressure (bar)")
         figure.legend(loc="outside lower center", ncols=2)
-    return {"dead_zone": figure}
+    return figure
 
 
-@identification_figures.register
-def _(found: WallHeatFit) -> dict[str, Figure]:
+def wall_heat_figure(found: WallHeatFit) -> Figure:
     """Decay with the exponential and with the fitted heat law, and their residuals."""
     with styled():
         figure = new_figure(COLUMN_IN, 3.4)
@@ -121,11 +112,10 @@ def _(found: WallHeatFit) -> dict[str, Figure]:
         upper.legend()
         lower.set_ylabel("residual (Pa)\nmean of 50")
         lower.set_xlabel("time from the stop (s)")
-    return {"wall_heat": figure}
+    return figure
 
 
-@identification_figures.register
-def _(found: FrictionMap) -> dict[str, Figure]:
+def friction_figure(found: FrictionMap) -> Figure:
     """Friction over speed: runs, break-aways, and the fitted curve."""
     with styled():
         figure = new_figure(COLUMN_IN, 2.8)
@@ -139,11 +129,10 @@ def _(found: FrictionMap) -> dict[str, Figure]:
         axes.set_xlabel("velocity (m/s)")
         axes.set_ylabel("friction (N)")
         axes.legend()
-    return {"friction": figure}
+    return figure
 
 
-@identification_figures.register
-def _(found: DeadVolumes) -> dict[str, Figure]:
+def dead_volume_figure(found: DeadVolumes) -> Figure:
     """Pressure of each chamber with the flat window and its line back to the release."""
     with styled():
         figure = new_figure(COLUMN_IN, 0.6 + 1.7 * len(found.curves))
@@ -158,4 +147,19 @@ def _(found: DeadVolumes) -> dict[str, Figure]:
             axes.set_ylabel(f"{release.chamber.replace('_', ' ')}\npressure (bar)")
         panels[0].legend()
         panels[-1].set_xlabel("time (s)")
-    return {"dead_volume": figure}
+    return figure
+
+
+FIGURES: dict[type[Identified], tuple[str, Callable[..., Figure]]] = {
+    FlowFit: ("flow", flow_figure),
+    DeadZoneLimits: ("dead_zone", dead_zone_figure),
+    WallHeatFit: ("wall_heat", wall_heat_figure),
+    FrictionMap: ("friction", friction_figure),
+    DeadVolumes: ("dead_volume", dead_volume_figure),
+}
+
+
+def identification_figures(found: Identified) -> dict[str, Figure]:
+    """The figure of a result, by file name."""
+    name, draw = FIGURES[type(found)]
+    return {name: draw(found)}

@@ -7,8 +7,8 @@ where a run is slow enough to show it (three v_s), and else stays the rig's.  F_
 where the piston rests, and its deviation counts the spread over the break-aways.
 
 The bristle follows by rule (S002-6): F_c / 50 um <= sigma_0 <= F_c / 1 um, and
-sigma_1 <= sigma_2 / (F_s / F_c - 1).  The rig keeps its own deflection inside these bounds; beyond them
-it gets sigma_0 = F_c / 25.3 um, the paper's choice, and the largest sigma_1.
+sigma_1 <= sigma_2 / (F_s / F_c - 1).  The rig keeps its own deflection inside these
+bounds; beyond them it gets sigma_0 = F_c / 25.3 um, the paper's choice, and the largest sigma_1.
 
 Source: paper 002 Eqs. 12 to 14, 20, 21, Figs. 13, 14, Table 5 (magnitudes for v < 0, E002-6;
 sigma_1 in N s/m, E002-13); physics.md 5.

@@ -226,8 +226,8 @@ def _together(found: list[Estimate]) -> Estimate:
 PROCEDURE = Procedure(
     name="wall-heat",
     gives="thermal time constant, heat coefficient of the wall",
-    manoeuvre="ports of one chamber plugged, piston pushed by a third of the stroke in 0.2 s and held "
-    "for 5 s",
+    manoeuvre="ports of one chamber plugged, piston pushed by a third of the stroke in 0.2 s "
+    "and held for 5 s",
     source="paper 002 Eqs. 16 to 19, Fig. 12, Table 4 (S002-3)",
     run=wall_heat,
 )
