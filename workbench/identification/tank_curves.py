@@ -10,8 +10,9 @@ the area A(u); the plant's leak, heat flow and volume act beside it.  A dead tim
 and sensor.  b, a and m lean on the rig's values within the range of table values, since a
 curve that rests early says little of them.
 
-The rig's own parameters, far fewer, are then fitted to all curves at once.  Find the dead zone first:
-the leak of the closed spool, which the rig must know, comes from there and acts on every curve.
+The rig's own parameters, far fewer, are then fitted to all curves at once.  Find the dead zone
+first: the leak of the closed spool, which the rig must know, comes from there and acts on every
+curve.
 
 Source: paper 002 4.1, Eqs. 1 to 3, Figs. 7 to 10, 17 (arguments and branches by errata E002-1 to
 E002-4, which the flow law of the plant has); physics.md 5, row S002-1.
