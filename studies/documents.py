@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from workbench.comparison.compare import Comparison, RecordingComparison
     from workbench.diagnosis.result import Diagnosis, Law, Ranked, Where
     from workbench.fitting.errors import SignalError
+    from workbench.identification.result import Estimate, Identified
 
 Document = dict[str, Any]
 
@@ -197,4 +198,30 @@ def _next_recording(best: Ranked) -> Document:
         "what": best.candidate.cause.shown_by,
         "separates": [best.candidate.name, *best.tied_with],
         "expected_gain": None,
+    }
+
+
+def identification_document(procedure: str, found: Identified) -> Document:
+    """What an identification procedure found, in SI; parameters are those of the rig."""
+
+    def told(estimates: tuple[Estimate, ...]) -> Document:
+        return {
+            public_name(each.name): {
+                "value": plain(each.value),
+                "unit": si_unit(each.name),
+                "std": plain(each.deviation),
+            }
+            for each in estimates
+        }
+
+    return {
+        "schema": "workbench.identification/1",
+        "procedure": procedure,
+        "rig": found.rig.name,
+        "estimates": told(found.estimates),
+        "parameters": told(found.parameters),
+        "curves": [
+            {"curve": curve.label, "mean_absolute_error": plain(curve.mean_absolute_error)}
+            for curve in found.curves
+        ],
     }

@@ -3,7 +3,7 @@
 Whatever takes time to import is imported inside the commands, so that ``--help`` is quick.
 """
 
-from studies.command_line import catalogue, control, missing, plant, show, study
+from studies.command_line import catalogue, control, identify, missing, plant, show, study
 from studies.command_line.application import app
 
 ORDER = [
@@ -17,6 +17,7 @@ ORDER = [
     "add",
     "improve",
     "fit",
+    "identify",
     "modes",
     "design",
     "check",
@@ -25,7 +26,17 @@ ORDER = [
 ]
 app.registered_commands.sort(key=lambda command: ORDER.index(command.callback.__name__))
 
-__all__ = ["app", "catalogue", "control", "main", "missing", "plant", "show", "study"]
+__all__ = [
+    "app",
+    "catalogue",
+    "control",
+    "identify",
+    "main",
+    "missing",
+    "plant",
+    "show",
+    "study",
+]
 
 
 def main() -> None:

@@ -142,6 +142,15 @@ class StribeckFriction(Effect):
         plain_n = self.coulomb_force_n * (1.0 + self.coulomb_weight * side) + excess_n
         return self._along(now) * plain_n + self._pressed_n(now)
 
+    def steady_force_n(self, now: Conditions) -> Expression:
+        """What any of these laws comes to in steady sliding: F = sign(v) g + s2 (v + e |v|).
+
+        Source: paper 002 Eqs. 12 to 14 (F4 of physics.md 1.3).
+        """
+        velocity_m_s = self.sliding_velocity_m_s(now)
+        dry_n = ca.sign(velocity_m_s) * self.dry_force_n(now)
+        return dry_n + self.viscous_force_n(velocity_m_s)
+
     def viscous_force_n(self, velocity_m_s: Expression) -> Expression:
         """Viscous part, asymmetric too: s2 (v + e |v|)."""
         return self.viscous_n_s_m * (velocity_m_s + self.asymmetry * ca.fabs(velocity_m_s))

@@ -1,0 +1,182 @@
+"""S002-7: dead volumes from a known tank that is let into a locked chamber.
+
+Tank (V_1, P_1) and chamber (V_i, P_i0) end at one pressure P_2 and, after some seconds, at the
+temperature of the room, so that the gas of both is that of the common volume:
+
+    P_1 V_1 + P_i0 V_i = P_2 (V_1 + V_i),    V_i = V_1 (P_1 - P_2) / (P_2 - P_i0)
+
+all pressures absolute.  Erratum E002-9: Eq. 22 prints V_i = V_1 (P_1 / P_2 - 1), which holds for an
+empty chamber only; with absolute pressures and a chamber at ambient it is 20 % too small.
+
+P_2 is read in the flat window, at least 20 s behind the release, and carried back to the
+release along its own slope there: what is lost by then has leaked, not cooled.  The dead volume is
+V_i without what the piston has swept, by the plant's own geometry.
+
+Source: paper 002 Eqs. 22, 23, Fig. 15, Table 6 (E002-8, E002-9); physics.md 5, row S002-7.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from workbench.errors import InputError, Message
+from workbench.identification.held_gas import (
+    STILL_M,
+    geometry,
+    position_channel,
+    pressed_chamber,
+)
+from workbench.identification.result import Curve, Estimate, Identified, Procedure, unfit
+from workbench.parts import Chamber
+from workbench.plant import Plant
+from workbench.recording import Recording
+from workbench.rig import Rig
+
+TANK_M3 = 0.344e-3  # E002-10
+TANK_CHANNEL = "supply.pressure_pa"
+FLAT_S = (20.0, 30.0)  # behind the release
+LEAST_RISE = 0.05  # of the pressure of the tank
+SAME = 0.01  # of the pressure: the tank has emptied into the chamber
+GAUGE_ERROR = 1e-3  # of a pressure sensor's span of 10 bar: its share in the deviation
+SPAN_PA = 10e5
+
+
+@dataclass(frozen=True)
+class Release:
+    """One release: pressures in Pa, times in s behind the start of the recording."""
+
+    chamber: str
+    opened_s: float
+    window_s: tuple[float, float]
+    tank_pa: float
+    before_pa: float
+    after_pa: float
+    slope_pa_s: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class DeadVolumes(Identified):
+    """Total and dead volume of each chamber that was filled; ``curves`` hold its pressure."""
+
+    releases: tuple[Release, ...]
+
+
+def dead_volume(
+    rig: Rig, recordings: Sequence[Recording], tank_volume_m3: float = TANK_M3
+) -> DeadVolumes:
+    """Dead volumes of the chambers that a tank of known volume was let into.
+
+    The tank stands where the supply was: its pressure is the channel ``supply.pressure``.
+
+    Raises
+    ------
+    InputError
+        If a recording has no release into a locked chamber, or ends before the flat window.
+    """
+    plant = rig.fit_for(recordings[0])
+    found: dict[str, tuple[Estimate, Estimate]] = {}
+    releases, curves = [], []
+    for each in recordings:
+        chamber = _locked(plant, each)
+        release = _release(chamber, each)
+        if chamber.name in found:
+            what = f"fills {chamber.name} again"
+            raise unfit(each, what, "one recording for each chamber")
+        found[chamber.name] = _volumes(plant, chamber, each, release, tank_volume_m3)
+        releases.append(release)
+        curves.append(_curve(each, release))
+    return DeadVolumes(
+        rig=rig,
+        estimates=tuple(total for total, _ in found.values()),
+        parameters=tuple(dead for _, dead in found.values()),
+        curves=tuple(curves),
+        releases=tuple(releases),
+    )
+
+
+def _locked(plant: Plant, recording: Recording) -> Chamber:
+    """The chamber that is filled, its piston locked."""
+    if TANK_CHANNEL not in recording.channels:
+        what = "is no reservoir test: the pressure of the tank is not recorded"
+        raise unfit(recording, what, "it as supply.pressure, where the tank stands for the supply")
+    chamber = pressed_chamber(plant, recording)
+    if not isinstance(chamber, Chamber):
+        what = "has no cylinder chamber, whose dead volume could be found"
+        raise InputError(Message(what, plant.name, "a drive"))
+    moved_m = float(np.ptp(recording[position_channel(chamber)]))
+    if moved_m > STILL_M:
+        what = f"is no reservoir test: the piston moves by {1e3 * moved_m:.3g} mm"
+        raise unfit(recording, what, "a piston locked in its place")
+    return chamber
+
+
+def _release(chamber: Chamber, recording: Recording) -> Release:
+    pressure, tank = recording[f"{chamber.name}.pressure_pa"], recording[TANK_CHANNEL]
+    time_s = recording.time_s
+    expected = "a full tank let into the chamber once, 0.2 s or more after the start"
+    first = max(round(0.1 / recording.sample_time_s), 3)
+    rise_pa = float(np.max(pressure) - np.mean(pressure[:first]))
+    if rise_pa < LEAST_RISE * float(np.mean(tank[:first])):
+        what = f"is no reservoir test: {chamber.name} rises by {rise_pa / 1e5:.2g} bar only"
+        raise unfit(recording, what, expected)
+    begun = int(np.flatnonzero(pressure > np.mean(pressure[:first]) + 0.05 * rise_pa)[0])
+    if begun < 2 * first:
+        what = f"is no reservoir test: it begins {time_s[begun]:.2g} s before the release"
+        raise unfit(recording, what, expected)
+    opened_s = float(time_s[begun])
+    window_s = (opened_s + FLAT_S[0], opened_s + FLAT_S[1])
+    if time_s[-1] < window_s[1]:
+        what = f"ends {time_s[-1] - opened_s:.3g} s after the release"
+        raise unfit(recording, what, f"{FLAT_S[1]:g} s: the gas must come to room temperature")
+    flat = (time_s >= window_s[0]) & (time_s <= window_s[1])
+    slope, level = np.polyfit(time_s[flat] - opened_s, pressure[flat], 1)
+    apart_pa = abs(float(np.mean(tank[flat] - pressure[flat])))
+    if apart_pa > SAME * float(np.mean(pressure[flat])):
+        what = f"is no reservoir test: tank and chamber end {apart_pa / 1e5:.2g} bar apart"
+        raise unfit(recording, what, "the tap left open until both have one pressure")
+    before = slice(0, begun - first)
+    means = (float(np.mean(channel[before])) for channel in (tank, pressure))
+    return Release(chamber.name, opened_s, window_s, *means, float(level), float(slope))
+
+
+def _volumes(
+    plant: Plant, chamber: Chamber, recording: Recording, release: Release, tank_m3: float
+) -> tuple[Estimate, Estimate]:
+    """Total volume and dead volume; the deviation is that of three pressure readings."""
+    fallen = release.tank_pa - release.after_pa
+    risen = release.after_pa - release.before_pa
+    total = tank_m3 * fallen / risen
+    slopes = np.array([1 / fallen, -1 / fallen - 1 / risen, 1 / risen])
+    deviation = total * GAUGE_ERROR * SPAN_PA * float(np.linalg.norm(slopes)) / np.sqrt(12.0)
+    dead = f"{chamber.name}.dead_volume_m3"
+    swept = geometry(plant, chamber, recording)[0] - plant.values[dead]
+    return (
+        Estimate(f"{chamber.name}.total_volume_m3", total, deviation),
+        Estimate(dead, total - swept, deviation),
+    )
+
+
+def _curve(recording: Recording, release: Release) -> Curve:
+    """Pressure of the chamber, and the line through its flat window from the release on."""
+    time_s, pressure = recording.time_s, recording[f"{release.chamber}.pressure_pa"]
+    line = release.after_pa + release.slope_pa_s * (time_s - release.opened_s)
+    fitted = np.where(time_s < release.opened_s, release.before_pa, line)
+    return Curve(
+        label=f"{recording.name}, {release.chamber}",
+        along=time_s,
+        measured=pressure,
+        fitted=fitted,
+    )
+
+
+PROCEDURE = Procedure(
+    name="dead-volume",
+    gives="total and dead volume of each chamber",
+    manoeuvre="a full tank of known volume in place of the supply, let into one locked chamber "
+    "that has been at ambient; log both pressures for 1 s before and 30 s after",
+    source="paper 002 Eqs. 22, 23, Fig. 15, Table 6 (S002-7, E002-9)",
+    run=dead_volume,
+)

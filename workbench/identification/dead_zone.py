@@ -1,0 +1,143 @@
+"""S002-2: limits of the dead zone from the static pressure map under a slow sweep of the command.
+
+On a closed tank the pressure stands while the spool covers both ports, but for the leak, rises as
+soon as the command passes the upper limit zmd, and falls as soon as it passes the lower one, zms:
+
+    centre = (zms + zmd) / 2,   half-width = (zmd - zms) / 2
+
+Both are fitted to the whole recording with the rig's own plant, beside what else shapes its edges:
+the sizes of both paths, which are not kept, and the leak of the closed spool.  The slopes of
+paper 002's dead-zone block have no counterpart: full command is full opening for every width.
+
+Source: paper 002 Fig. 11, Table 3 (4.53 V, 5.37 V); physics.md 2.4 and 5, row S002-2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from workbench.effects import DeadZone, FivePortValve
+from workbench.errors import InputError, Message
+from workbench.fitting.noise import measured_noise
+from workbench.fitting.starts import guessed_states
+from workbench.identification.least_squares import Solution, Unknown, solve
+from workbench.identification.result import Curve, Identified, Procedure, estimated, unfit
+from workbench.identification.runs import outputs_under
+from workbench.parts import Body
+from workbench.plant import Plant
+from workbench.recording import Recording
+from workbench.rig import Rig
+
+REACHED = 0.8  # of supply minus ambient: the sweep must fill and empty the tank that far
+FASTEST_V_S = 2.0
+EDGE_V = 0.02  # a change of a limit that shows
+
+
+@dataclass(frozen=True, kw_only=True)
+class DeadZoneLimits(Identified):
+    """The limits, and the map: ``curves`` hold the pressure over the command."""
+
+    lower_v: float
+    upper_v: float
+
+
+def dead_zone(rig: Rig, recordings: Sequence[Recording]) -> DeadZoneLimits:
+    """Limits of the dead zone, and the leak of the closed spool.
+
+    Raises
+    ------
+    InputError
+        If the plant is no tank behind a valve, or a recording no slow sweep through both limits.
+    """
+    plant = rig.fit_for(recordings[0]).lean(keep=[_zone(rig.plant).name])
+    zone, valve = _zone(plant), _valve(plant)
+    for each in recordings:
+        _check_sweep(plant, each)
+    noise = measured_noise(recordings, plant.measured)[plant.measured[0]]
+    pieces = [piece for each in recordings for piece in each.pieces]
+    names = [f"{zone.name}.centre_v", f"{zone.name}.half_width_v"]
+    names += [f"{valve.name}.{k}" for k in ("leak_area_m2", "supply_fraction", "exhaust_fraction")]
+    found = _fitted(plant, pieces, names, noise)
+    centre_v, half_v = found.values[:2]
+    shares = np.array([[1.0, -1.0], [1.0, 1.0]])
+    deviations = np.sqrt(np.diag(shares @ found.covariance[:2, :2] @ shares.T))
+    lower_v, upper_v = float(centre_v - half_v), float(centre_v + half_v)
+    return DeadZoneLimits(
+        rig=rig,
+        estimates=estimated(("lower_limit_v", "upper_limit_v"), (lower_v, upper_v), deviations),
+        parameters=estimated(names[:3], found.values[:3], found.deviations[:3]),
+        curves=tuple(_curves(plant, pieces, found.residuals)),
+        lower_v=lower_v,
+        upper_v=upper_v,
+    )
+
+
+def _fitted(plant: Plant, pieces: list[Recording], names: list[str], noise: float) -> Solution:
+    known, own = plant.parameters, plant.values
+    scales = (EDGE_V, EDGE_V, 0.2 * known[names[2]].typical, 0.1, 0.1)
+    unknowns = [
+        Unknown(own[name], scale, known[name].lower, known[name].upper)
+        for name, scale in zip(names, scales, strict=True)
+    ]
+    runs = [outputs_under(plant, piece, names) for piece in pieces]
+    starts = [guessed_states(plant, piece)[0, :, 0] for piece in pieces]
+    measured = [piece[plant.measured[0]] for piece in pieces]
+
+    def residuals(x: np.ndarray) -> np.ndarray:
+        rows = zip(measured, runs, starts, strict=True)
+        return np.concatenate([m - run(x, start)[0] for m, run, start in rows])
+
+    return solve(residuals, unknowns, noise)
+
+
+def _curves(plant: Plant, pieces: list[Recording], residuals: np.ndarray) -> list[Curve]:
+    command, pressure = plant.commands[0].name, plant.measured[0]
+    parts = np.split(residuals, np.cumsum([len(piece) for piece in pieces])[:-1])
+    return [
+        Curve(
+            label=piece.name,
+            along=piece[command],
+            measured=piece[pressure],
+            fitted=piece[pressure] - left,
+        )
+        for piece, left in zip(pieces, parts, strict=True)
+    ]
+
+
+def _zone(plant: Plant) -> DeadZone:
+    found = [effect for effect in plant.effects if isinstance(effect, DeadZone)]
+    if not found or any(isinstance(part, Body) for part in plant.parts):
+        what = "is no tank behind a valve with a dead zone"
+        raise InputError(Message(what, plant.name, "a rig of servo_reservoir"))
+    return found[0]
+
+
+def _valve(plant: Plant) -> FivePortValve:
+    return next(effect for effect in plant.effects if isinstance(effect, FivePortValve))
+
+
+def _check_sweep(plant: Plant, recording: Recording) -> None:
+    command, pressure = recording[plant.commands[0].name], recording[plant.measured[0]]
+    ends_pa = plant.values["supply.pressure_pa"], plant.values["atmosphere.pressure_pa"]
+    moved_pa = float(np.nanmax(pressure) - np.nanmin(pressure))
+    expected = "a slow sweep of the command through both limits, which fills and empties the tank"
+    if moved_pa < REACHED * (ends_pa[0] - ends_pa[1]):
+        what = f"is no map of the dead zone: the pressure moves by {moved_pa / 1e5:.2g} bar only"
+        raise unfit(recording, what, expected)
+    smooth = np.convolve(command, np.ones(25) / 25, mode="valid")
+    fastest_v_s = float(np.max(np.abs(np.diff(smooth)))) / recording.sample_time_s
+    if fastest_v_s > FASTEST_V_S:
+        what = f"is no map of the dead zone: the command moves at {fastest_v_s:.3g} V/s"
+        raise unfit(recording, what, f"{expected}, below {FASTEST_V_S:g} V/s")
+
+
+PROCEDURE = Procedure(
+    name="dead-zone",
+    gives="limits of the dead zone, leak of the closed spool",
+    manoeuvre="valve on a closed tank, slow sine of the command (20 s) of 1.2 V about its centre",
+    source="paper 002 Fig. 11, Table 3 (S002-2)",
+    run=dead_zone,
+)

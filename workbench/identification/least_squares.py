@@ -1,0 +1,108 @@
+"""Bounded least squares with standard deviations that count how long errors stay correlated."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+DIFFERENCE = 1e-3  # of the scale of an unknown: the integrator chooses its steps by the state
+ROOM = 1e-9  # beyond a bound: a start at the bound is inside
+MOST_EVALUATIONS = 60
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """A number to be found.
+
+    ``scale`` is a typical change.  ``prior_deviation`` is that of the start value where something
+    is known of it beforehand, infinite where nothing is.
+    """
+
+    start: float
+    scale: float
+    lower: float = -np.inf
+    upper: float = np.inf
+    prior_deviation: float = np.inf
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Values (n,), their covariance (n, n), and the residuals (m,) without those of the priors."""
+
+    values: np.ndarray
+    covariance: np.ndarray
+    residuals: np.ndarray
+
+    @property
+    def deviations(self) -> np.ndarray:
+        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+
+
+def solve(
+    residuals: Callable[[np.ndarray], np.ndarray], unknowns: list[Unknown], noise: float
+) -> Solution:
+    """Least squares of residuals in one unit, whose smallest standard deviation is ``noise``.
+
+    The covariance is that of the residuals' own size, at least the noise, times the number of
+    samples over which they are correlated: 1 000 samples of a slow error are worth a few.
+
+    Raises
+    ------
+    ArithmeticError
+        If the residuals are not finite at the start.
+    """
+    from scipy.optimize import least_squares
+
+    start, scale = (np.array([getattr(u, k) for u in unknowns]) for k in ("start", "scale"))
+    lower, upper = (np.array([getattr(u, k) for u in unknowns]) for k in ("lower", "upper"))
+    known = noise / np.array([u.prior_deviation for u in unknowns])
+
+    def weighed(t: np.ndarray) -> np.ndarray:
+        x = start + scale * t
+        return np.concatenate([residuals(x), known * (x - start)])
+
+    first = weighed(np.zeros(len(start)))
+    if not np.isfinite(first).all():
+        raise ArithmeticError("the model is not finite at the rig's own values")
+    bounds = (lower - start) / scale - ROOM, (upper - start) / scale + ROOM
+
+    def slopes(t: np.ndarray) -> np.ndarray:
+        """Differences away from the nearer bound, over one step for all."""
+        steps = np.where(t + DIFFERENCE > bounds[1], -DIFFERENCE, DIFFERENCE)
+        here = weighed(t)
+        columns = [
+            weighed(t + h * row) - here for h, row in zip(steps, np.eye(len(t)), strict=True)
+        ]
+        return np.array(columns).T / steps
+
+    found = least_squares(
+        weighed,
+        np.zeros(len(start)),
+        jac=slopes,
+        bounds=bounds,
+        method="dogbox",  # the other one creeps away from a bound that it starts at
+        max_nfev=MOST_EVALUATIONS,
+    )
+    left = found.fun[: len(found.fun) - len(start)]
+    worth = max(len(left) - len(start), 1)
+    size = max(float(left @ left) / worth, noise**2) * correlation_samples(left)
+    rows, priors = found.jac[: len(left)], np.diag((known * scale / noise) ** 2)
+    information = rows.T @ rows / size + priors
+    covariance = np.linalg.pinv(information) * np.outer(scale, scale)
+    return Solution(start + scale * found.x, covariance, left)
+
+
+def correlation_samples(residuals: np.ndarray) -> float:
+    """Integrated autocorrelation time, up to the first negative correlation; at least 1."""
+    n = len(residuals)
+    centred = residuals - residuals.mean()
+    power = np.abs(np.fft.rfft(centred, 2 * n)) ** 2
+    correlation = np.fft.irfft(power)[: n // 2]
+    if not len(correlation) or correlation[0] <= 0:
+        return 1.0
+    correlation = correlation / correlation[0]
+    negative = np.flatnonzero(correlation < 0)
+    end = int(negative[0]) if len(negative) else len(correlation)
+    return float(max(1.0, 1.0 + 2.0 * correlation[1:end].sum()))
