@@ -90,7 +90,10 @@ def recordings(cases: Iterable[Case]) -> list[tuple[Recording, Recording]]:
     cases = list(cases)
     pairs = record(cases)
     return [
-        (_recording(train, f"{case.hidden} training"), _recording(held_out, f"{case.hidden} other"))
+        (
+            recording_of(train, f"{case.hidden} training"),
+            recording_of(held_out, f"{case.hidden} other"),
+        )
         for case, (train, held_out) in zip(cases, pairs, strict=True)
     ]
 
@@ -146,7 +149,8 @@ def summary(found: Iterable[Answer]) -> str:
     )
 
 
-def _recording(table: Mapping[str, np.ndarray], name: str) -> Recording:
+def recording_of(table: Mapping[str, np.ndarray], name: str) -> Recording:
+    """A table of the truth as a recording in SI."""
     channels = {
         public: np.asarray(table[column]) * factor
         for column, (public, factor) in CHANNELS.items()
