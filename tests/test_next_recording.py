@@ -28,10 +28,8 @@ from workbench.manoeuvres.limits import Drive, limits_of
 from workbench.manoeuvres.play import odd_multisine
 from workbench.manoeuvres.rehearse import rehearse, speed_maps
 from workbench.reading import read_recording
-from workbench.reading.command_writer import write_commands
 from workbench.recording import Recording
-from workbench.recording_format import ChannelFormat, RecordingFormat, TimeFormat
-from workbench.rig import default_rig, load_rig
+from workbench.rig import load_rig
 
 PLACE, COMMAND = "slide.position_m", "valve.command_v"
 A, B = "chamber_a.pressure_pa", "chamber_b.pressure_pa"
@@ -89,7 +87,9 @@ def test_every_manoeuvre_keeps_to_ranges_of_commands_and_of_recorded_places(
         if play.looped:
             for axis, row in zip(limits.axes, play.reference, strict=True):
                 assert row[0] == pytest.approx(axis.start)
-                assert row.min() >= axis.low - 1e-12 and row.max() <= axis.high + 1e-12
+                low, high = axis.stops if each.ends else (axis.low, axis.high)
+                room = 0.11 * (axis.high - axis.low) if each.ends else 1e-12
+                assert not np.any((row < low - room) | (row > high + room)), each.words
 
 
 def test_every_manoeuvre_moves_something_and_is_the_same_every_time(limits):
@@ -101,8 +101,8 @@ def test_every_manoeuvre_moves_something_and_is_the_same_every_time(limits):
 
 
 def moved_by(play):
-    """How much a manoeuvre moves behind its first two seconds, in which it leaves the start."""
-    return np.std((play.reference if play.looped else play.commands)[:, 2000:], axis=1).max()
+    """Largest change in a sample behind the first two seconds, in which it leaves the start."""
+    return np.abs(np.diff((play.reference if play.looped else play.commands)[:, 2000:])).max()
 
 
 def test_a_smaller_share_makes_a_smaller_manoeuvre(limits):
@@ -204,8 +204,8 @@ def test_the_loop_follows_a_slow_triangle_in_spite_of_the_dead_zone(rivals):
     assert np.isfinite(run[COMMAND]).all()
 
 
-def test_what_tells_a_force_from_a_sensor_offset_is_a_rest_with_a_vented_chamber(rivals, asked):
-    assert "both ends" in asked.what
+def test_a_force_and_a_sensor_offset_can_be_told_apart(rivals, asked):
+    assert asked.what.startswith(tuple(each.words for each in SHORT))
     assert asked.separates == tuple(rivals)
     assert asked.expected_gain > 10.0
     assert asked.alike == ()
@@ -216,8 +216,9 @@ def test_the_recommended_recording_keeps_the_limits_for_every_rival(rivals, aske
     limits = limits_of(fit.plant, fit.windows.recordings)
 
     assert list(asked.predicted) == list(rivals)
+    ends = any(each.ends and asked.what.startswith(each.words) for each in SHORT)
     for run in asked.predicted.values():
-        assert limits.broken_by(run, ends=True) == ""
+        assert limits.broken_by(run, ends) == ""
 
 
 def test_nothing_is_recommended_for_rivals_that_are_the_same(rivals):
@@ -228,6 +229,7 @@ def test_nothing_is_recommended_for_rivals_that_are_the_same(rivals):
         next_recording({"one": fit})
 
 
+@pytest.mark.filterwarnings("ignore:.*did you mean 'reference")
 def test_commands_read_back_as_the_rig_reads_its_files(demo_rig, asked, tmp_path):
     save_next_recording(demo_rig, asked, tmp_path, "a command")
 
@@ -239,31 +241,6 @@ def test_commands_read_back_as_the_rig_reads_its_files(demo_rig, asked, tmp_path
     np.testing.assert_allclose(back[COMMAND], first[COMMAND], rtol=1e-9)
     for ending in ("pdf", "svg"):
         assert (tmp_path / f"next_recording.{ending}").stat().st_size > 1000
-
-
-@pytest.mark.parametrize(
-    "dialect",
-    [
-        dict(decimal=",", separator=";"),
-        dict(separator="\t", skip=2),
-        dict(header=False, time=TimeFormat(None, "s", 1e-3)),
-        dict(time=TimeFormat("t", "ms")),
-    ],
-    ids=["decimal comma", "two rows to skip", "numbers for names", "milliseconds"],
-)
-def test_commands_read_back_in_every_dialect(tmp_path, dialect):
-    rig = default_rig("servo_drive")
-    column = 3 if dialect.get("header") is False else "spool (V)"
-    channels = {**rig.reader.channels, COMMAND: ChannelFormat(column, "mV")}
-    rig = replace(rig, reader=RecordingFormat(channels=channels, **dialect))
-    played = Recording("played", 1e-3, {COMMAND: np.linspace(4.0, 6.0, 200)})
-    reference = {PLACE: np.linspace(0.1, 0.2, 200)}
-
-    write_commands(rig, played, tmp_path / "next.csv", reference)
-
-    back = read_inputs(rig, tmp_path / "next.csv")
-    np.testing.assert_allclose(back[COMMAND], played[COMMAND], rtol=1e-9)
-    assert back.sample_time_s == pytest.approx(1e-3)
 
 
 def test_text_says_what_to_record_and_what_it_is_expected_to_bring(asked):

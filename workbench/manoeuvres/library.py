@@ -24,7 +24,6 @@ from workbench.manoeuvres.play import (
     zigzag,
 )
 
-SLOWER = 5.0  # times slower than recorded: towards stops
 BEYOND = 0.1  # of what was recorded: how far a reference goes beyond a stop
 
 # Positions, through a position loop.
@@ -78,7 +77,7 @@ def slowly_to_both_ends(limits: Limits, share: float) -> Play:
     """
     time_s = limits.time_s
     third_s = time_s[-1] / 3.0
-    move_s = min(SLOWER / share * _move_s(limits), 0.7 * third_s)
+    move_s = min(0.4 / share, 0.95) * third_s
     places = []
     for axis in limits.axes:
         span = axis.high - axis.low
