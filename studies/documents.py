@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from linearize.modes import HybridModel
     from studies.closed_loop_check import Check
     from workbench.comparison.compare import Comparison, RecordingComparison
-    from workbench.diagnosis.result import Diagnosis, Law, Ranked, Where
+    from workbench.diagnosis.result import Diagnosis, Law, NextRecording, Ranked, Where
     from workbench.fitting.errors import SignalError
     from workbench.identification.result import Estimate, Identified
 
@@ -71,7 +71,7 @@ def _compared(each: RecordingComparison) -> Document:
 
 def diagnosis_document(found: Diagnosis, unit_of: Mapping[str, str]) -> Document:
     """A diagnosis, with the keys of interface.md section 4."""
-    named, best = found.named, found.best
+    named = found.named
     return {
         "schema": "workbench.diagnosis/1",
         "rig": found.rig_name,
@@ -84,7 +84,7 @@ def diagnosis_document(found: Diagnosis, unit_of: Mapping[str, str]) -> Document
         "law": _law(found.law) if found.law else None,
         "before": errors(found.before, unit_of),
         "after": {"train": {}, "validation": {}} | errors(found.after, unit_of),
-        "next_recording": _next_recording(best) if best and best.tied_with else None,
+        "next_recording": _next_recording(found.next_recording),
         "warnings": list(found.warnings),
     }
 
@@ -192,12 +192,15 @@ def _law(law: Law) -> Document:
     }
 
 
-def _next_recording(best: Ranked) -> Document:
-    """What the catalogue says shows the best of a tie; its gain is not worked out here."""
+def _next_recording(asked: NextRecording | None) -> Document | None:
+    """What to record next; its gain is null where nothing can be played."""
+    if asked is None:
+        return None
     return {
-        "what": best.candidate.cause.shown_by,
-        "separates": [best.candidate.name, *best.tied_with],
-        "expected_gain": None,
+        "what": asked.what,
+        "separates": list(asked.separates),
+        "expected_gain": plain(asked.expected_gain),
+        "alike": [list(pair) for pair in asked.alike],
     }
 
 

@@ -1,4 +1,4 @@
-"""Modes for other programs: a MAT file, a table, and the pole map."""
+"""What other programs take: modes as a MAT file and a table, commands to be played."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ from workbench.errors import whole_file
 
 if TYPE_CHECKING:
     from linearize.modes import HybridModel
+    from workbench.diagnosis.result import NextRecording
+    from workbench.rig import Rig
 
 
 def export_modes(hybrid: HybridModel, folder: Path, command: str) -> None:
@@ -42,3 +44,19 @@ def _write_mat(hybrid: HybridModel, path: Path) -> None:
             row[key] = np.array(getattr(mode, key), dtype=object)
     with path.open("wb") as file:
         savemat(file, {"modes": modes})
+
+
+def save_next_recording(rig: Rig, asked: NextRecording | None, folder: Path, command: str) -> None:
+    """next_recording.pdf and .svg with what each rival would record, and what is to be played.
+
+    next_recording.csv holds commands and reference in the columns and units of the rig's files,
+    in place of the curves that stand beside other figures.  Nothing where nothing can be played.
+    """
+    from studies.figures.next_recording import next_recording_figure
+    from workbench.reading.command_writer import write_commands
+
+    if asked is None or not asked.predicted:
+        return
+    save(next_recording_figure(asked), folder / "next_recording", command)
+    commands = asked.predicted[asked.separates[0]]
+    write_commands(rig, commands, folder / "next_recording.csv", asked.reference)

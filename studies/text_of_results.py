@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from workbench.diagnosis.improve import Addition, Improvement
-    from workbench.diagnosis.result import Diagnosis, Law, Ranked
+    from workbench.diagnosis.result import Diagnosis, Law, NextRecording, Ranked
     from workbench.fitting.errors import SignalError
     from workbench.fitting.fit import FitReport
 
@@ -38,7 +38,18 @@ def diagnosis_text(found: Diagnosis, unit_of: Mapping[str, str]) -> str:
         parts += ["", where_text(found)]
     if found.after and unit_of:
         parts += ["", before_after_text(found.before, found.after, unit_of)]
+    if found.next_recording:
+        parts += ["", next_recording_text(found.next_recording)]
     return "\n".join(parts)
+
+
+def next_recording_text(asked: NextRecording) -> str:
+    """What to record next, and what that is expected to bring."""
+    told = f"it tells apart {', '.join(asked.separates)}"
+    if isfinite(asked.expected_gain):
+        told += f": the right one gains {number(asked.expected_gain, 3)} of chi2, expected"
+    told += "".join(f"; {one} and {other} stay alike" for one, other in asked.alike)
+    return f"next recording: {asked.what}\n{told}"
 
 
 def ranking_text(found: Diagnosis) -> str:

@@ -3,6 +3,7 @@
 import json
 import math
 import re
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -20,6 +21,7 @@ from workbench.diagnosis.result import (
     Dependence,
     Diagnosis,
     Law,
+    NextRecording,
     Ranked,
     Size,
     Verdict,
@@ -116,13 +118,16 @@ def test_what_is_no_number_is_null_in_json():
     json.dumps(document, allow_nan=False)
 
 
-def test_a_tie_asks_for_the_recording_that_shows_its_best():
-    found = diagnosis(Verdict.TIE, tied=("spool_leak",))
+def test_a_tie_says_what_to_record_next():
+    names = ("chamber_leak@chamber_a", "spool_leak")
+    asked = NextRecording("hold and wait", names, 240.0)
+    found = replace(diagnosis(Verdict.TIE, tied=names[1:]), next_recording=asked)
 
     following = diagnosis_document(found, UNITS)["next_recording"]
 
-    assert following["what"] == LEAK.cause.shown_by
-    assert following["separates"] == ["chamber_leak@chamber_a", "spool_leak"]
+    assert (following["what"], following["expected_gain"]) == ("hold and wait", 240.0)
+    assert following["separates"] == list(names)
+    assert "next recording: hold and wait" in diagnosis_text(found, {})
 
 
 def test_nothing_missing_names_no_effect():

@@ -58,10 +58,12 @@ def diagnose(
         units = unit_names(known.plant.measured + known.plant.optional_outputs)
         write_json(json, diagnosis_document(found, units))
         if figures:
+            from studies.export import save_next_recording
             from studies.figures.diagnosis import diagnosis_figures
             from studies.figures.style import save_all
 
             save_all(diagnosis_figures(found), figures, command_text())
+            save_next_recording(known, found.next_recording, figures, command_text())
             say(f"figures in {figures}")
         typer.echo(diagnosis_text(found, units))
 

@@ -15,7 +15,7 @@ from studies.truth.case import Case, generator
 from studies.truth.draw import EFFECTS, HIDDEN, draw, drive_of
 from studies.truth.manoeuvre import training_reference, validation_reference
 from studies.truth.misfit import scaled
-from studies.truth.run import Run, closed_loop
+from studies.truth.run import Run, closed_loop, commanded
 
 __all__ = ["HIDDEN", "Case", "Table", "draw", "record", "scaled", "write_csv"]
 
@@ -54,6 +54,20 @@ def run_cases(cases: Sequence[Case]) -> Run:
             references.append(reference(generator(case.hidden, case.seed, purpose)))
             generators.append(generator(case.hidden, case.seed, purpose + " noise"))
     return closed_loop(drives, np.stack(references, axis=1), generators)
+
+
+def played(
+    case: Case, commands_v: np.ndarray, reference_m: np.ndarray | None, start_m: float
+) -> Table:
+    """What the true drive of a case records of commands, or of a reference in its own loop, (n,).
+
+    The loop is that of the other recordings, with their unknown dead zone, not the rehearsal's.
+    """
+    drives = [drive_of(case)]
+    generators = [generator(case.hidden, case.seed, "next noise")]
+    if reference_m is None:
+        return _table(commanded(drives, commands_v[:, None], generators, start_m), 0, case)
+    return _table(closed_loop(drives, reference_m[:, None], generators), 0, case)
 
 
 def _table(run: Run, column: int, case: Case) -> Table:

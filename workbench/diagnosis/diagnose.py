@@ -21,6 +21,7 @@ from workbench.diagnosis.judge import (
     reasons_against,
 )
 from workbench.diagnosis.law import empirical_law
+from workbench.diagnosis.next_recording import recommended
 from workbench.diagnosis.ranking import ranked
 from workbench.diagnosis.refit import Refit, refit, refit_shift
 from workbench.diagnosis.result import NAMING, Diagnosis, Law, Ranked, Where
@@ -116,6 +117,7 @@ def diagnose(
         warnings=warnings,
         base=problem.base,
         base_validation=problem.base_validation,
+        next_recording=recommended(verdict, ranking, problem.base, progress),
     )
 
 

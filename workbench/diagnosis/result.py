@@ -12,6 +12,7 @@ from workbench.effect import Kind
 from workbench.fitting.errors import SignalError
 from workbench.fitting.gauss_newton import Fit
 from workbench.plant import Candidate
+from workbench.recording import Recording
 
 
 class Verdict(Enum):
@@ -154,12 +155,49 @@ class Law:
 
 
 @dataclass(frozen=True)
+class NextRecording:
+    """What to record so that rivals can be told apart.
+
+    Attributes
+    ----------
+    what
+        What a person does.
+    separates
+        The rivals, the likeliest first; ``nothing`` is the model as it is.
+    expected_gain
+        Chi2 by which the right rival should then be better than any other that is not alike, NaN
+        where nothing can be played.
+    alike
+        Pairs of rivals that it does not tell apart either.
+    predicted
+        What each rival would record, by its name; the first one's commands are to be played.
+    commands
+        Their names.
+    reference
+        What a position loop is to follow, by output, (n,) in SI; empty where commands are played as
+        they are.
+    noise
+        Standard deviation of the sensor noise by output, in SI.
+    """
+
+    what: str
+    separates: tuple[str, ...]
+    expected_gain: float
+    alike: tuple[tuple[str, str], ...] = ()
+    predicted: Mapping[str, Recording] = field(default_factory=dict, repr=False)
+    commands: tuple[str, ...] = ()
+    reference: Mapping[str, np.ndarray] = field(default_factory=dict, repr=False)
+    noise: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class Diagnosis:
     """One round of diagnosis; see interface.md section 4 for its JSON.
 
     ``before`` and ``after`` map ``train`` and ``validation`` to errors by public output name.
     ``after`` belongs to what the verdict names, an effect or a law, and is empty without.
     ``base`` is the prior fit without any addition, ``base_validation`` the same on held-out data.
+    ``next_recording`` is there where the verdict leaves a question open.
     """
 
     rig_name: str
@@ -173,6 +211,7 @@ class Diagnosis:
     warnings: tuple[str, ...]
     base: Fit = field(repr=False)
     base_validation: Fit | None = field(repr=False)
+    next_recording: NextRecording | None = None
 
     @property
     def named(self) -> Ranked | None:

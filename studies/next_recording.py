@@ -1,0 +1,88 @@
+"""Study ``next-recording``: whether the recommended recording breaks the tie that asked for it.
+
+The independent truth of a case plays the commands, or follows the reference in its own loop, and
+the case is diagnosed again with one training recording more.
+
+``python -m studies.next_recording constant_force:3 sensor_offset:3`` prints each verdict before and
+after; a case takes two diagnoses.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from studies.hidden_benches import SERVO_DRIVE
+from studies.hidden_effects import recordings
+from studies.truth.case import Case
+from studies.truth.cases import read_cases
+from studies.truth.record import played
+from workbench.diagnosis.diagnose import diagnose
+from workbench.diagnosis.result import Diagnosis, NextRecording
+from workbench.plant_files import plant_named
+from workbench.recording import Recording
+
+POSITION, COMMAND = "slide.position_m", "valve.command_v"
+
+
+@dataclass(frozen=True)
+class Separation:
+    """A case before and after the recording that the first diagnosis asked for; None without."""
+
+    case: Case
+    before: Diagnosis
+    after: Diagnosis | None
+
+    @property
+    def broken(self) -> bool:
+        """The hidden effect is named alone."""
+        leader = self.after.ranking[0] if self.after else None
+        name = SERVO_DRIVE.public_name(self.case)
+        return bool(leader and leader.accepted and not leader.tied_with
+                    and leader.candidate.name == name)  # fmt: skip
+
+
+def recorded(case: Case, asked: NextRecording) -> Recording:
+    """What the truth of a case records of what was asked for."""
+    commands = next(iter(asked.predicted.values()))[COMMAND]
+    states = plant_named(SERVO_DRIVE.plant)
+    start_m = float(dict(zip(states.state_list, states.initial, strict=True))[POSITION])
+    table = played(case, commands, asked.reference.get(POSITION), start_m)
+    return SERVO_DRIVE.recording(table, "next recording")
+
+
+def separate(case: Case, train: Recording, validation: Recording) -> Separation:
+    """Diagnose, record what is asked for, and diagnose again."""
+    before = diagnose(SERVO_DRIVE.user_rig(case), [train], [validation])
+    asked = before.next_recording
+    if asked is None or not asked.predicted:
+        return Separation(case, before, None)
+    more = recorded(case, asked)
+    return Separation(case, before, diagnose(SERVO_DRIVE.user_rig(case), [train, more], [validation]))
+
+
+def separation_text(found: Separation) -> str:
+    """The verdict before, what was recorded, and the verdict after."""
+    asked = found.before.next_recording
+    lines = [f"{found.case.hidden} seed {found.case.seed}: {found.before.sentence}"]
+    if asked:
+        lines.append(f"  {asked.what}; gain {asked.expected_gain:.3g}, alike {asked.alike}")
+    if found.after:
+        lines.append(f"  after it {found.after.verdict.value}: {found.after.sentence}")
+    return "\n".join([*lines, f"  {'broken' if found.broken else 'NOT broken'}"])
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Print the separation of stored cases; see the module."""
+    parser = argparse.ArgumentParser(prog="python -m studies.next_recording", description=__doc__)
+    parser.add_argument("cases", nargs="+", metavar="EFFECT:SEED")
+    asked = parser.parse_args(arguments)
+    pairs = [(name, int(seed)) for name, _, seed in (each.partition(":") for each in asked.cases)]
+    cases = [read_cases()[pair] for pair in pairs]
+    for case, (train, validation) in zip(cases, recordings(cases), strict=True):
+        print(separation_text(separate(case, train, validation)), flush=True)
+
+
+if __name__ == "__main__":
+    main()
