@@ -187,7 +187,7 @@ def figures():
     found = diagnosis(tied=("spool_leak",))
     return {
         **diagnosis_figures(found),
-        "budget": budget_figure([("as it came", 9.0, 11.0), ("+ leak", 2.0, math.nan)]),
+        "budget": budget_figure([Stage("as it came", 9.0, 11.0), Stage("+ leak", 2.0, math.nan)]),
         "errors": before_after_figure(found.before, found.after, UNITS),
         "poles": pole_figure(standard_modes(PLANT)),
     }

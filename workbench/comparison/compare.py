@@ -24,6 +24,7 @@ from workbench.fitting.noise import measured_noise
 from workbench.fitting.start_states import refit_starts
 from workbench.fitting.starts import guessed_states
 from workbench.fitting.windows import WINDOW_S, Windows, cut_windows
+from workbench.law_range import warn_beyond
 from workbench.plant import Plant
 from workbench.recording import Recording
 from workbench.rig import Rig
@@ -92,6 +93,8 @@ class Comparison:
 
 def compare(rig: Rig, recordings: Sequence[Recording]) -> Comparison:
     """How well the rig's plant tells what was recorded; see the module for the horizons."""
+    for recording in recordings:
+        warn_beyond(rig, recording)
     return Comparison(rig.name, tuple(_compared(rig, recording) for recording in recordings))
 
 
