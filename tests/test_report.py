@@ -15,6 +15,7 @@ from studies.figures.modes import pole_figure
 from studies.figures.style import new_figure, save, styled
 from studies.text import columns, shown
 from studies.text_of_results import correlation_lines, diagnosis_text, unit_names
+from workbench.diagnosis.improve import Stage
 from workbench.diagnosis.result import (
     DecidedBy,
     Dependence,
