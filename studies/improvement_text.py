@@ -11,7 +11,7 @@ from studies.text_of_results import before_after_text, law_text, moved_text
 from workbench.units import public_name, si_unit
 
 if TYPE_CHECKING:
-    from workbench.diagnosis.improve import Improvement
+    from workbench.diagnosis.improvement import Improvement
     from workbench.diagnosis.passes import Removal, Swap
 
 FREE_RUNS = (

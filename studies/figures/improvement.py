@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from studies.figures.style import BLACK, BLUE, COLUMN_IN, ORANGE, PAGE_IN, new_figure, styled
-from workbench.diagnosis.improve import Change, Stage
+from workbench.diagnosis.improvement import Change, Stage
 from workbench.units import display_scale, display_unit, public_name
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from studies.text_of_results import (
 )
 
 if TYPE_CHECKING:
-    from workbench.diagnosis.improve import Improvement
+    from workbench.diagnosis.improvement import Improvement
 
 
 def report_improvement(found: Improvement, folder: Path, command: str) -> Path:
