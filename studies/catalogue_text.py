@@ -14,6 +14,7 @@ from workbench.plant import Plant
 from workbench.plant_files import plant_named
 from workbench.plants import PLANTS
 from workbench.rig import parameter_names
+from workbench.rig_laws import is_law, law_terms
 from workbench.units import public_name
 
 
@@ -68,7 +69,7 @@ def effects_of_plant_text(name: str) -> str:
 
 
 def candidate_name(plant: Plant, effect: str, at: str | None) -> str:
-    """The full name of an effect at its place: ``chamber_leak@chamber_a``.
+    """The full name of an effect or empirical term at its place: ``chamber_leak@chamber_a``.
 
     Raises
     ------
@@ -76,9 +77,10 @@ def candidate_name(plant: Plant, effect: str, at: str | None) -> str:
         If the plant has no such effect, or several and no place is named.
     """
     name = f"{effect}@{at}" if at else effect
-    if name in plant.candidates:
+    there = [*plant.candidates, *law_terms(plant)]
+    if name in there:
         return name
-    places = [full for full in plant.candidates if full.partition("@")[0] == effect]
+    places = [full for full in there if full.partition("@")[0] == effect]
     if len(places) == 1 and at is None:
         return places[0]
     if places == [effect]:
@@ -86,7 +88,9 @@ def candidate_name(plant: Plant, effect: str, at: str | None) -> str:
     if places:
         raise InputError(Message("needs its place", effect, f"--at, for one of {listed(places)}"))
     known = f"one that `workbench effects {plant.name}` lists"
-    near = nearest(name, plant.candidates)
+    near = nearest(name, there)
+    if is_law(name):
+        known = f"one of {listed(law_terms(plant))}"
     raise InputError(Message(why_not(plant, name), name, known, near))
 
 

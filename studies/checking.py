@@ -20,6 +20,7 @@ from studies.scenarios import SCENARIOS
 from studies.text import shown
 from workbench.contracts import Controller
 from workbench.errors import InputError, Message, listed
+from workbench.law_range import warn_beyond
 from workbench.plant import Plant, require
 from workbench.rig import Rig
 from workbench.units import public_name
@@ -56,6 +57,9 @@ def check_rig(
         progress(f"closed loop, run {number + 1} of {runs}")
         plant = drawn(rig, rng) if number else rig.plant
         found = check(plant, controllers, estimators, names, believed=rig.plant, seed=number)
+        for row, record in zip(found.rows, found.records, strict=True):
+            run = f"{row.scenario} with {row.design}"
+            warn_beyond(rig, replace(record.recording, name=run))
         mark = f" {number + 1}" if runs > 1 else ""
         rows += [replace(row, design=row.design + mark) for row in found.rows]
         records += found.records

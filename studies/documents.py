@@ -81,7 +81,7 @@ def diagnosis_document(found: Diagnosis, unit_of: Mapping[str, str]) -> Document
         "sentence": found.sentence,
         "ranking": [_ranked(row) for row in found.ranking],
         "where": _where(found.where) if found.where else None,
-        "law": _law(found.law) if found.law else None,
+        "law": law_document(found.law) if found.law else None,
         "before": errors(found.before, unit_of),
         "after": {"train": {}, "validation": {}} | errors(found.after, unit_of),
         "next_recording": _next_recording(found.next_recording),
@@ -175,7 +175,8 @@ def _where(where: Where) -> Document:
     }
 
 
-def _law(law: Law) -> Document:
+def law_document(law: Law) -> Document:
+    """An empirical law: balance, terms, the ranges in which it was seen, and what adds it."""
     return {
         "balance": law.balance,
         "terms": {
@@ -189,6 +190,8 @@ def _law(law: Law) -> Document:
         "error_drop_train": plain(law.drop_train),
         "error_drop_validation": plain(law.drop_validation),
         "text": law.text,
+        "kind": "empirical",
+        "add": [step.candidate.name for step in law.steps],
     }
 
 

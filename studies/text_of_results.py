@@ -12,7 +12,7 @@ from workbench.units import public_name
 if TYPE_CHECKING:
     import numpy as np
 
-    from workbench.diagnosis.improve import Addition, Improvement
+    from workbench.diagnosis.addition import Addition, Moved
     from workbench.diagnosis.result import Diagnosis, Law, NextRecording, Ranked
     from workbench.fitting.errors import SignalError
     from workbench.fitting.fit import FitReport
@@ -78,9 +78,12 @@ def law_text(law: Law) -> str:
         f"{public_name(name)} {shown(low, name, 3)} to {shown(high, name, 3)}"
         for name, (low, high) in law.ranges.items()
     )
+    names = " ".join(f'"{step.candidate.name}"' for step in law.steps)
     return (
-        f"law: drop train {percent(law.drop_train, 1)}, "
-        f"validation {percent(law.drop_validation, 1)}; seen for {', '.join(ranges)}"
+        f"law (empirical, not a physical effect): {names}; "
+        f"drop train {percent(law.drop_train, 1)}, validation {percent(law.drop_validation, 1)}; "
+        f"seen for {', '.join(ranges)}\n"
+        "`workbench add RIG law --fit ...` takes it, `improve --law` does where nothing else helps"
     )
 
 
@@ -159,29 +162,22 @@ def addition_text(found: Addition, unit_of: Mapping[str, str]) -> str:
     drops = f"misfit removed: {percent(found.drop_train, 1)} of training"
     if isfinite(found.drop_validation):
         drops += f", {percent(found.drop_validation, 1)} of validation"
-    rows = [
+    parameters = moved_text(found.parameters)
+    errors = before_after_text(found.before, found.after, unit_of)
+    return "\n".join((errors, drops, "", parameters))
+
+
+def moved_text(rows: Sequence[Moved]) -> str:
+    """Parameters with their standard deviations before and after."""
+    told = [
         (
             public_name(row.name),
             spread(row.before, row.prior_deviation, row.name),
             spread(row.after, row.deviation, row.name),
         )
-        for row in found.parameters
+        for row in rows
     ]
-    parameters = columns(("parameter", "before", "after"), rows)
-    errors = before_after_text(found.before, found.after, unit_of)
-    return "\n".join((errors, drops, "", parameters))
-
-
-def improvement_text(found: Improvement, unit_of: Mapping[str, str]) -> str:
-    """The falling error, what was added, and errors before the first and after the last step."""
-    rows = [(label, number(train), number(held_out)) for label, train, held_out in found.budget]
-    head = ("with", "chi2 per sample, training", "validation")
-    parts = [columns(head, rows), ""]
-    parts += [f"diagnosis {k}: {d.sentence}" for k, d in enumerate(found.diagnoses, start=1)]
-    if found.steps:
-        first, last = found.steps[0], found.steps[-1]
-        parts += ["", before_after_text(first.before, last.after, unit_of)]
-    return "\n".join(parts)
+    return columns(("parameter", "before", "after"), told)
 
 
 def fit_text(found: FitReport, unit_of: Mapping[str, str]) -> str:

@@ -16,6 +16,7 @@ from studies.figures.modes import pole_figure
 from studies.figures.style import new_figure, save, styled
 from studies.text import columns, shown
 from studies.text_of_results import correlation_lines, diagnosis_text, unit_names
+from workbench.diagnosis.improvement import Stage
 from workbench.diagnosis.result import (
     DecidedBy,
     Dependence,
@@ -28,7 +29,7 @@ from workbench.diagnosis.result import (
     Where,
 )
 from workbench.effect import Kind
-from workbench.effects.empirical import EmpiricalForce
+from workbench.effects.empirical import FORCES
 from workbench.fitting.errors import SignalError
 from workbench.plants import PLANTS
 
@@ -137,18 +138,18 @@ def test_nothing_missing_names_no_effect():
 
 
 def test_an_empirical_law_comes_with_its_range():
-    force = EmpiricalForce(name="law@slide", body="slide")
-    terms = {f"law@slide.{cause.strength}": -240.0 for cause in force.causes}
+    names = [f"{kind.causes[0].name}@slide.{kind.causes[0].strength}" for kind in FORCES]
+    terms = dict.fromkeys(names, -240.0)
     ranges = {"slide.velocity_m_s": (-0.5, 0.5), "chamber_a.pressure_pa": (3e5, 6e5)}
     law = Law("slide.momentum", terms, ranges, 0.8, 0.7, "-240 v|v|")
 
     document = diagnosis_document(diagnosis(Verdict.NOT_IN_CATALOGUE, law=law), UNITS)
 
     assert document["law"]["terms"] == {
-        "law@slide.quadratic": {"value": -240.0, "unit": "N s^2/m^2"},
-        "law@slide.cubic": {"value": -240.0, "unit": "N s^3/m^3"},
-        "law@slide.placed_viscous": {"value": -240.0, "unit": "N s/m^2"},
-        "law@slide.curved": {"value": -240.0, "unit": "N/m^2"},
+        "law[v|v|]@slide.quadratic": {"value": -240.0, "unit": "N s^2/m^2"},
+        "law[v^3]@slide.cubic": {"value": -240.0, "unit": "N s^3/m^3"},
+        "law[v|x - mid|]@slide.placed_viscous": {"value": -240.0, "unit": "N s/m^2"},
+        "law[(x - mid)^2]@slide.curved": {"value": -240.0, "unit": "N/m^2"},
     }
     assert document["law"]["ranges"] == {
         "slide.velocity": {"low": -0.5, "high": 0.5, "unit": "m/s"},
@@ -192,7 +193,7 @@ def figures():
     found = diagnosis(tied=("spool_leak",))
     return {
         **diagnosis_figures(found),
-        "budget": budget_figure([("as it came", 9.0, 11.0), ("+ leak", 2.0, math.nan)]),
+        "budget": budget_figure([Stage("as it came", 9.0, 11.0), Stage("+ leak", 2.0, math.nan)]),
         "errors": before_after_figure(found.before, found.after, UNITS),
         "poles": pole_figure(standard_modes(PLANT)),
     }

@@ -16,6 +16,7 @@ from workbench.plant import Candidate, Plant
 from workbench.plant_files import plant_named
 from workbench.recording import Recording
 from workbench.recording_format import RecordingFormat, default_format, read_format
+from workbench.rig_laws import Ranges, is_law, law_terms, read_seen, with_laws
 from workbench.rig_text import RigText, read_text
 from workbench.units import (
     STANDARD_ATMOSPHERE_PA,
@@ -28,7 +29,7 @@ from workbench.units import (
 
 AMBIENT = "atmosphere.pressure_pa"
 ACCEPTED = "# accepted: "
-KEYS = ("name", "plant", "effects", "values", "uncertainty", "fixed", "recording")
+KEYS = ("name", "plant", "effects", "values", "uncertainty", "fixed", "seen", "recording")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,6 +51,8 @@ class Rig:
         How recordings are read.
     notes
         One line for each effect that was accepted.
+    seen
+        Range in SI, by full name, in which the empirical terms among the added were seen.
     """
 
     name: str
@@ -60,6 +63,7 @@ class Rig:
     fixed: frozenset[str] = frozenset()
     reader: RecordingFormat
     notes: tuple[str, ...] = ()
+    seen: Ranges = field(default_factory=dict)
     path: Path | None = None
 
     def standard_deviation(self, parameter: str) -> float:
@@ -130,7 +134,7 @@ def load_rig(path_or_text: Path | str) -> Rig:
     text = RigText(content, str(path) if path else "rig")
     text.keys_among((), text.tree, KEYS)
     name = text.typed(("plant",), str, "", "the name of a plant")
-    plant = _plant(text, name, path)
+    plant = with_laws(_plant(text, name, path), filter(is_law, text.names(("effects", "add"))))
     added, removed = _effects(text, plant)
     values = _values(text, plant, removed)
     nulls = {plant.candidates[n].strength for n in removed}
@@ -141,6 +145,7 @@ def load_rig(path_or_text: Path | str) -> Rig:
         removed=removed,
         deviations=_deviations(text, plant, plant.values | values | absent),
         fixed=_fixed(text, plant),
+        seen=read_seen(text, plant),
         reader=read_format(text, plant),
         notes=tuple(x[len(ACCEPTED) :] for x in content.splitlines() if x.startswith(ACCEPTED)),
         path=path,
@@ -182,7 +187,7 @@ def _effects(text: RigText, plant: Plant) -> tuple[tuple[str, ...], tuple[str, .
     found = []
     for key in ("add", "remove"):
         names: list[str] = []
-        for item in _names(text, ("effects", key)):
+        for item in text.names(("effects", key)):
             places = _candidates(plant, item)
             if not places:
                 _no_such_cause(text, ("effects", key), plant, item)
@@ -204,6 +209,8 @@ def _candidates(plant: Plant, name: str) -> list[str]:
 def _no_such_cause(text: RigText, place: tuple[str, ...], plant: Plant, item: str) -> None:
     near = [*plant.candidates, *(c.cause.name for c in plant.candidates.values())]
     expected = f"one that `workbench effects {plant.name}` lists"
+    if is_law(item):
+        near, expected = [*law_terms(plant)], f"one of {listed(law_terms(plant))}"
     text.wrong(place, why_not(plant, item), item=item, expected=expected, known=near)
 
 
@@ -278,19 +285,10 @@ def _deviations(text: RigText, plant: Plant, values: Mapping[str, float]) -> dic
 def _fixed(text: RigText, plant: Plant) -> frozenset[str]:
     text.keys_among(("fixed",), text.table("fixed"), ("names",))
     names, found = parameter_names(plant), set()
-    for item in _names(text, ("fixed", "names")):
+    for item in text.names(("fixed", "names")):
         if item not in names:
             text.unknown(("fixed", "names"), plant.name, _same_member(item, names), item)
         elif found & set(names[item]):
             text.wrong(("fixed", "names"), "is named twice", item=item, expected="it once")
         found.update(names.get(item, ()))
     return frozenset(found)
-
-
-def _names(text: RigText, place: tuple[str, ...]) -> list[str]:
-    """A list of names."""
-    found = text.typed(place, list, [], "a list of names")
-    for item in found:
-        if not isinstance(item, str):
-            text.wrong(place, f"{item!r} is no name")
-    return [item for item in found if isinstance(item, str)]

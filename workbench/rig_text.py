@@ -39,12 +39,13 @@ class RigText:
         expected: str = "",
         known: Iterable[str] = (),
     ) -> None:
-        """Note what is wrong at a place, or with one ``item`` of the list there."""
+        """Note what is wrong at a place, or with one ``item`` of the list there; once is enough."""
         name = item or (place[-1] if place else "")
         near = nearest(name, known)
-        self.messages.append(
-            Message(what, name, expected, near, file=self.file, line=self.line(place, item))
-        )
+        line = self.line(place, item)
+        message = Message(what, name, expected, near, file=self.file, line=line)
+        if message not in self.messages:
+            self.messages.append(message)
 
     def unknown(self, place: tuple[str, ...], owner: str, known: Iterable[str], item: str = ""):
         """Note a name that ``owner`` does not have."""
@@ -84,6 +85,14 @@ class RigText:
             return found
         self.wrong(place, f"{found!r} is of the wrong type", expected=expected)
         return default
+
+    def names(self, place: tuple[str, ...]) -> list[str]:
+        """A list of names at a place, empty where there is none; what is no text is noted."""
+        found = self.typed(place, list, [], "a list of names")
+        for item in found:
+            if not isinstance(item, str):
+                self.wrong(place, f"{item!r} is no name")
+        return [item for item in found if isinstance(item, str)]
 
     def line(self, place: tuple[str, ...], item: str = "") -> int:
         """The line of a key, or of an item of the list there; of the table around it if need be."""

@@ -9,6 +9,7 @@ from workbench.plant import Plant
 from workbench.plant_files import as_it_came, plant_text
 from workbench.recording_format import default_format, format_lines
 from workbench.rig import ACCEPTED, Rig
+from workbench.rig_laws import seen_lines, with_laws
 from workbench.rig_text import quoted
 from workbench.units import public_name, written
 
@@ -25,7 +26,7 @@ def write_rig(rig: Rig, path: Path | str) -> None:
 
 def rig_text(rig: Rig, folder: Path | None = None) -> str:
     """The text that :func:`write_rig` writes; a user's own plant as seen from ``folder``."""
-    own = as_it_came(rig.plant)
+    own = with_laws(as_it_came(rig.plant), rig.added)
     lines = [ACCEPTED + " ".join(note.split()) for note in rig.notes]
     lines += [""] if lines else []
     lines += [f"name = {quoted(rig.name)}", f"plant = {quoted(plant_text(rig.plant, folder))}"]
@@ -37,6 +38,7 @@ def rig_text(rig: Rig, folder: Path | None = None) -> str:
     lines += _section("uncertainty", {n: written(v, n) for n, v in rig.deviations.items()})
     if rig.fixed:
         lines += ["", "[fixed]", f"names = {_list(sorted(map(public_name, rig.fixed)))}"]
+    lines += seen_lines(rig.seen)
     if rig.reader != default_format(own):
         lines += ["", *format_lines(rig.reader)]
     return "\n".join(lines) + "\n"

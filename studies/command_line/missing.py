@@ -28,6 +28,7 @@ ADD = (
     "--validate validation.csv -o rig2.toml"
 )
 IMPROVE = "workbench improve rig.toml train.csv --validate validation.csv -o rig2.toml"
+LAW = "law"  # in place of an effect: the empirical law that explains most
 FIT = "workbench fit rig.toml train.csv --validate validation.csv -o rig2.toml"
 
 
@@ -71,7 +72,9 @@ def diagnose(
 @app.command(cls=Spread, epilog=example(ADD))
 def add(
     rig: RigFile,
-    effect: Annotated[str, typer.Argument(metavar="EFFECT", help="As `workbench effects` lists.")],
+    effect: Annotated[
+        str, typer.Argument(metavar="EFFECT", help="As `workbench effects` lists, or a law.")
+    ],
     fit: Annotated[
         list[Path], typer.Option("--fit", metavar="TRAIN...", help="Recordings to fit.")
     ],
@@ -80,21 +83,33 @@ def add(
     validate: Validate = None,
     quiet: Quiet = False,
 ) -> None:
-    """Add one effect, refit, and print the error before and after on both sets."""
+    """Add one effect, refit, and print the error before and after on both sets.
+
+    EFFECT may be an empirical term of a diagnosis, such as "law[v|v|]@slide", or law: then the
+    empirical law of up to three terms that explains most.  It is no physical effect, and the rig
+    file says in which range it was seen.
+    """
     with answering(quiet) as say:
         from studies.catalogue_text import candidate_name
         from studies.text_of_results import addition_text, unit_names
         from workbench.diagnosis.improve import add as add_effect
+        from workbench.diagnosis.improve import add_law
         from workbench.rig import load_rig
         from workbench.rig_writing import write_rig
 
         writable(output)
         known = load_rig(rig)
-        name = candidate_name(known.plant, effect, at)
+        whole_law = effect == LAW and at is None
+        name = "" if whole_law else candidate_name(known.plant, effect, at)
         read, held_out = read_to_fit(known, fit, say), read_all(known, validate, say)
-        found = add_effect(known, name, read, held_out, say)
-        write_rig(found.rig, output)
-        typer.echo(addition_text(found, unit_names(known.plant.measured)))
+        if whole_law:
+            found = add_law(known, read, held_out, say)
+        else:
+            found = (add_effect(known, name, read, held_out, say),)
+        write_rig(found[-1].rig, output)
+        for step in found:
+            text = addition_text(step, unit_names(known.plant.measured))
+            typer.echo(f"{step.rig.notes[-1]}\n{text}\n")
         typer.echo(f"wrote {output}")
 
 
@@ -107,25 +122,37 @@ def improve(
     report: Annotated[
         Path | None, typer.Option("--report", metavar="DIR", help="Report and figures.")
     ] = None,
+    law: Annotated[
+        bool, typer.Option("--law", help="In the end take an empirical law, if one passes.")
+    ] = False,
+    json: Json = None,
     quiet: Quiet = False,
 ) -> None:
-    """Diagnose and add, again and again, until nothing in the catalogue earns its place."""
+    """Diagnose and add, again and again, until nothing in the catalogue earns its place.
+
+    Then each effect is taken out once, and its rivals are tried in its place: what is no longer
+    needed is dropped, and a clearly better rival takes over.  With --law an empirical law is taken
+    in the end, where nothing of the catalogue earns its place and the law passes the same criteria.
+    """
     with answering(quiet) as say:
-        from studies.text_of_results import improvement_text, unit_names
+        from studies.improvement_text import improvement_document, improvement_text
+        from studies.text_of_results import unit_names
         from workbench.diagnosis.improve import improve as improve_rig
         from workbench.rig import load_rig
         from workbench.rig_writing import write_rig
 
-        writable(output, folders=[report])
+        writable(output, json, folders=[report])
         known = load_rig(rig)
         read, held_out = read_to_fit(known, train, say), read_all(known, validate, say)
-        found = improve_rig(known, read, held_out, say)
+        found = improve_rig(known, read, held_out, say, law)
+        units = unit_names(known.plant.measured + known.plant.optional_outputs)
         write_rig(found.rig, output)
+        write_json(json, improvement_document(found, units))
         if report:
             from studies.report.improvement import report_improvement
 
             say(f"report in {report_improvement(found, report, command_text())}")
-        typer.echo(improvement_text(found, unit_names(known.plant.measured)))
+        typer.echo(improvement_text(found, units))
         typer.echo(f"wrote {output}")
         if found.stopped:
             raise typer.Exit(STOPPED)

@@ -3,37 +3,77 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from studies.figures.style import BLUE, COLUMN_IN, ORANGE, PAGE_IN, new_figure, styled
+from studies.figures.style import BLACK, BLUE, COLUMN_IN, ORANGE, PAGE_IN, new_figure, styled
+from workbench.diagnosis.improvement import Change, Stage
 from workbench.units import display_scale, display_unit, public_name
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from workbench.fitting.errors import SignalError
 
+WIDE_FROM = 3  # bars that one column holds
 
-def budget_figure(budget: Sequence[tuple[str, float, float]]) -> Figure:
-    """The falling error: (label, chi2 per sample training, validation) after each effect."""
+
+def budget_figure(budget: Sequence[Stage]) -> Figure:
+    """The falling error as a waterfall: what is left after each step, and what the step took.
+
+    Outlines reach up to the step before (or down, where an effect was dropped).  What the backward
+    and the swap pass did, and empirical terms, stand on a grey ground with a word.
+    """
+    wide = len(budget) > WIDE_FROM
     with styled():
-        figure = new_figure(COLUMN_IN, 2.4)
+        figure = new_figure(PAGE_IN if wide else COLUMN_IN, 2.6)
         axes = figure.subplots()
         places = np.arange(len(budget))
-        labels = [label.replace("@", "\n@") for label, _, _ in budget]
-        axes.set_xticks(places, labels, rotation=20 if len(budget) > 3 else 0)
-        sets = (("training", 1, BLUE, ""), ("validation", 2, ORANGE, "////"))
-        for offset, (label, column, colour, hatch) in zip((-0.2, 0.2), sets, strict=True):
-            values = [row[column] for row in budget]
+        labels = [_broken(stage.label) for stage in budget]
+        axes.set_xticks(places, labels, rotation=0 if wide or len(budget) < 4 else 20)
+        sets = (
+            ("training", [stage.train for stage in budget], BLUE, ""),
+            ("validation", [stage.validation for stage in budget], ORANGE, "////"),
+        )
+        for offset, (label, values, colour, hatch) in zip((-0.2, 0.2), sets, strict=True):
             bars = axes.bar(places + offset, values, 0.38, color=colour, hatch=hatch, label=label)
-            axes.bar_label(bars, fmt="%.3g", fontsize=6)
+            words = axes.bar_label(bars, fmt="%.3g", fontsize=6, padding=1.5)
+            for word in words:  # an outline may run behind it
+                word.set_bbox({"facecolor": "white", "edgecolor": "none", "pad": 0.2})
+            falls = [before - after for before, after in pairwise(values)]
+            axes.bar(
+                places[1:] + offset, falls, 0.38, values[1:], label=f"change of {label}",
+                facecolor="none", edgecolor=BLACK, linewidth=0.5, linestyle=(0, (2, 2)), zorder=0.5,
+            )  # fmt: skip
+        _mark(axes, budget)
         axes.grid(False, axis="x")
+        axes.margins(y=0.12)
         axes.set_ylabel("weighted squared error per sample (-)")
-        axes.set_title("error after each accepted effect")
-        axes.legend()
+        axes.set_title("error after each step")
+        filled, outlines = axes.containers[::2], axes.containers[1:2]
+        named = ["training", "validation", "what the step changed"]
+        figure.legend([*filled, *outlines], named, loc="outside lower center", ncols=3)
     return figure
+
+
+def _broken(label: str) -> str:
+    """A label over several lines: at its place, and between two effects."""
+    return label.replace("@", "\n@").replace(" for ", "\nfor ")
+
+
+def _mark(axes: Axes, budget: Sequence[Stage]) -> None:
+    """A grey ground and a word where a step is no plain addition of an effect."""
+    for place, stage in enumerate(budget):
+        if stage.change in (Change.START, Change.ADDED):
+            continue
+        axes.axvspan(place - 0.5, place + 0.5, color="0.9", zorder=0)
+        axes.text(
+            place, 0.98, stage.change.value, ha="center", va="top", fontsize=7, style="italic",
+            transform=axes.get_xaxis_transform(),
+        )  # fmt: skip
 
 
 def before_after_figure(

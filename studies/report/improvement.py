@@ -8,33 +8,35 @@ from typing import TYPE_CHECKING
 from studies.figures.diagnosis import diagnosis_figures
 from studies.figures.improvement import before_after_figure, budget_figure
 from studies.figures.style import save_all
+from studies.improvement_text import improvement_text
 from studies.report.page import FIGURES, Section, write_report
 from studies.text_of_results import (
     addition_text,
     diagnosis_text,
-    improvement_text,
     unit_names,
 )
 
 if TYPE_CHECKING:
-    from workbench.diagnosis.improve import Improvement
+    from workbench.diagnosis.improvement import Improvement
 
 
 def report_improvement(found: Improvement, folder: Path, command: str) -> Path:
     """Figures and the page of an improvement."""
     units = unit_names(found.rig.plant.measured + found.rig.plant.optional_outputs)
     figures = {"error_by_effect": budget_figure(found.budget)} if found.budget else {}
-    if found.steps:
-        first, last = found.steps[0], found.steps[-1]
-        figures["before_and_after"] = before_after_figure(first.before, last.after, units)
+    if found.parameters:
+        figures["before_and_after"] = before_after_figure(found.before, found.after, units)
+        if found.free_before:
+            free = before_after_figure(found.free_before, found.free_after, units)
+            figures["free_runs_before_and_after"] = free
     sections = [Section("The falling error", (), improvement_text(found, units), (*figures,))]
     for number, diagnosis in enumerate(found.diagnoses, start=1):
         drawn = diagnosis_figures(diagnosis, f"{number}_")
         text = diagnosis_text(diagnosis, units)
         sections.append(Section(f"Diagnosis {number}", (diagnosis.sentence,), text, (*drawn,)))
         figures |= drawn
-        if number <= len(found.steps):
-            text = addition_text(found.steps[number - 1], units)
-            sections.append(Section(f"Addition {number}", (), text))
+    for number, step in enumerate(found.steps, start=1):
+        title = f"Addition {number}: {step.candidate.name}"
+        sections.append(Section(title, step.rig.notes[-1:], addition_text(step, units)))
     save_all(figures, folder / FIGURES, command)
     return write_report(folder, f"Improvement of {found.rig.name}", command, sections)

@@ -101,15 +101,25 @@ def _accessories(rng: np.random.Generator) -> tuple[tuple[str, float], ...]:
     )
 
 
-def drive_of(case: Case, without: str = "") -> Drive:
-    """The true drive; `without` names a field whose difference is off, or "hidden"."""
+def drive_of(
+    case: Case,
+    without: str = "",
+    differences: tuple[Difference, ...] | None = None,
+    beside: Case | None = None,
+) -> Drive:
+    """The true drive; `without` names a field whose difference is off, or "hidden".
+
+    `differences` stand in place of the case's own; `beside` is a case whose hidden effect acts too.
+    """
     changes = dict(case.accessories)
-    for difference in case.differences:
+    for difference in case.differences if differences is None else differences:
         if difference.field != without:
             changes[difference.field] = getattr(NOMINAL, difference.field) + difference.change
     if case.hidden:
         size = 0.0 if without == "hidden" else case.size
         changes.update(_hidden_fields(case.hidden, size))
+    if beside is not None and beside.hidden:
+        changes.update(_hidden_fields(beside.hidden, beside.size))
     return replace(NOMINAL, **changes)
 
 

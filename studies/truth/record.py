@@ -38,7 +38,8 @@ def record(cases: Sequence[Case]) -> list[tuple[Table, Table]]:
     """
     run = run_cases(cases)
     return [
-        (_table(run, 2 * i, case), _table(run, 2 * i + 1, case)) for i, case in enumerate(cases)
+        (table(run, 2 * i, case.supply_recorded), table(run, 2 * i + 1, case.supply_recorded))
+        for i, case in enumerate(cases)
     ]
 
 
@@ -66,20 +67,23 @@ def played(
     drives = [drive_of(case)]
     generators = [generator(case.hidden, case.seed, "next noise")]
     if reference_m is None:
-        return _table(commanded(drives, commands_v[:, None], generators, start_m), 0, case)
-    return _table(closed_loop(drives, reference_m[:, None], generators), 0, case)
+        run = commanded(drives, commands_v[:, None], generators, start_m)
+    else:
+        run = closed_loop(drives, reference_m[:, None], generators)
+    return table(run, 0, case.supply_recorded)
 
 
-def _table(run: Run, column: int, case: Case) -> Table:
+def table(run: Run, column: int, supply_recorded: bool) -> Table:
+    """One column of a batch as a person would hand it over."""
     r = {name: values[:, column] for name, values in run.readings.items()}
-    table = dict(
+    found = dict(
         time_s=np.arange(len(r["command_v"])) * 1e-3,
         command_V=r["command_v"],
         position_mm=r["position_m"] * 1e3,
         pressure_a_bar=r["pressure_a_pa"] * 1e-5,
         pressure_b_bar=r["pressure_b_pa"] * 1e-5,
     )
-    return {**table, "supply_bar": r["supply_pa"] * 1e-5} if case.supply_recorded else table
+    return {**found, "supply_bar": r["supply_pa"] * 1e-5} if supply_recorded else found
 
 
 def write_csv(table: Table, path: Path | str) -> None:

@@ -31,6 +31,7 @@ from workbench.comparison.regimes import regimes_of, shares
 from workbench.comparison.residuals import Residual, residual_of
 from workbench.fitting.errors import SignalError
 from workbench.fitting.windows import WINDOW_S
+from workbench.law_range import warn_beyond
 from workbench.recording import Recording
 from workbench.rig import Rig
 
@@ -113,6 +114,8 @@ class Comparison:
 
 def compare(rig: Rig, recordings: Sequence[Recording]) -> Comparison:
     """How well the rig's plant tells what was recorded; see the module for the horizons."""
+    for recording in recordings:
+        warn_beyond(rig, recording)
     return Comparison(rig.name, tuple(_compared(rig, recording) for recording in recordings))
 
 

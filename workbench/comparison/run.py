@@ -7,6 +7,7 @@ from pathlib import Path
 
 from workbench.errors import InputError, Message, listed
 from workbench.fitting.starts import guessed_states
+from workbench.law_range import warn_beyond
 from workbench.plant import Plant
 from workbench.reading import read_recording
 from workbench.recording import Recording
@@ -30,7 +31,8 @@ def run(rig: Rig, recording: Recording) -> Recording:
     """The nonlinear plant under recorded inputs: inputs, states and outputs, piece by piece.
 
     Each piece starts from its first recorded sample where outputs were recorded, else from the
-    plant's own initial state.
+    plant's own initial state.  Where it leaves the range in which the rig's empirical terms were
+    seen, a warning says so.
 
     Raises
     ------
@@ -41,7 +43,9 @@ def run(rig: Rig, recording: Recording) -> Recording:
     """
     plant = _plant_for(rig, recording).lean()
     pieces = [simulate(plant, p, guessed_states(plant, p)[0, :, 0]) for p in recording.pieces]
-    return _joined(recording, pieces)
+    found = _joined(recording, pieces)
+    warn_beyond(rig, found)
+    return found
 
 
 def _plant_for(rig: Rig, recording: Recording) -> Plant:

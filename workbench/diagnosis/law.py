@@ -10,19 +10,21 @@ Source: diagnosis.md 1.9.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
 
 from workbench.diagnosis.judge import reasons_against
-from workbench.diagnosis.refit import Refit, refit
-from workbench.diagnosis.result import Law
+from workbench.diagnosis.refit import Refit, held_out_drop, refit
+from workbench.diagnosis.result import Law, LawTerm
 from workbench.diagnosis.rough import rough_fit
 from workbench.diagnosis.scan import scan
-from workbench.effects.empirical import EmpiricalFlow, EmpiricalForce
 from workbench.fitting.problem import Problem, misfit
-from workbench.parts import Body, Chamber
+from workbench.law_range import seen_in
 from workbench.plant import Candidate, Plant
+from workbench.recording import Recording
+from workbench.rig_laws import is_law, law_terms, with_laws
 
 MOST_TERMS = 3
 LEAST_TERM_SHARE = 0.10  # of the misfit that another term must take
@@ -34,38 +36,36 @@ def empirical_law(problem: Problem, to_beat: float = 0.0) -> Law | None:
     None, too, where the scan of its first term promises less than ``to_beat``, which the scan of
     an effect promised.
     """
-    problem = _with_terms(problem)
+    problem = with_terms(problem)
     first = problem
-    accepted: list[Candidate] = []
+    steps: list[LawTerm] = []
     best: Refit | None = None
     for _ in range(MOST_TERMS):
-        found = _next_term(problem, accepted, 0.0 if accepted else to_beat)
+        found = _next_term(problem, 0.0 if steps else to_beat)
         if not found or found.drop_train * misfit(problem.base) < LEAST_TERM_SHARE * first.misfit:
             break
         counted = _counted_from(first, found)
-        if reasons_against(first.base, counted, parameters=len(accepted) + 1):
+        if reasons_against(first.base, counted, parameters=len(steps) + 1):
             break
+        before = best.validation if best else first.base_validation
+        unseen = held_out_drop(before, found.validation)
+        steps.append(
+            LawTerm(found.candidate, found.fit, found.validation, found.drop_train, unseen)
+        )
         best = counted
-        accepted.append(found.candidate)
         # The next term is scanned at this fit, and its drop still counts from the first base.
         problem = replace(problem, added=(*problem.added, found.candidate), base=found.fit)
     if best is None:
         return None
-    return _law(problem, best, accepted)
+    return _law(best, steps)
 
 
-def _with_terms(problem: Problem) -> Problem:
-    """The problem with all empirical terms at null in its plants."""
-    bodies = [p for p in problem.whole.parts if isinstance(p, Body)]
-    chambers = [p for p in problem.whole.parts if isinstance(p, Chamber)]
-    terms = [
-        EmpiricalForce(name=f"law@{body.name}", body=body.name, middle_m=_middle(problem, body))
-        for body in bodies
-    ]
-    terms += [EmpiricalFlow(name=f"law@{c.name}", chamber=c.name, body=c.body) for c in chambers]
+def with_terms(problem: Problem) -> Problem:
+    """The problem with all empirical terms that its plants have a place for, absent."""
+    recordings = problem.base.windows.recordings
 
     def more(plant: Plant) -> Plant:
-        return plant.with_effects(*terms)
+        return plant_with_terms(plant, recordings)
 
     base = problem.base
     fit = replace(base, windows=replace(base.windows, plant=more(base.windows.plant)))
@@ -76,24 +76,39 @@ def _with_terms(problem: Problem) -> Problem:
     return replace(problem, whole=more(problem.whole), base=fit, base_validation=held_out)
 
 
-def _middle(problem: Problem, body: Body) -> float:
-    """Middle of the recorded stroke of a body in m."""
-    windows = problem.base.windows
-    name = f"{body.name}.position_m"
-    if name not in windows.plant.measured:
+def plant_with_terms(
+    plant: Plant, recordings: Iterable[Recording], names: Iterable[str] = ()
+) -> Plant:
+    """A plant with empirical terms, absent, around the middles of the recorded strokes.
+
+    All that it has a place for, or the named ones.
+    """
+    there = {effect.name for effect in plant.effects}
+    names = [name for name in (names or law_terms(plant)) if name not in there]
+    plant = with_laws(plant, names)
+    middles = {
+        f"{effect.name}.middle_m": _middle(effect.body, recordings)
+        for effect in plant.effects
+        if effect.name in names and "middle_m" in effect.parameters()
+    }
+    return plant.with_values(middles)
+
+
+def _middle(body: str, recordings: Iterable[Recording]) -> float:
+    """Middle of the recorded stroke of a body in m, 0 where no position was recorded."""
+    name = f"{body}.position_m"
+    values = [r[name] for r in recordings if name in r.channels]
+    if not values:
         return 0.0
-    values = windows.measured[windows.plant.measured.index(name)]
-    return float((np.nanmin(values) + np.nanmax(values)) / 2)
+    low, high = (end([end(v) for v in values]) for end in (np.nanmin, np.nanmax))
+    return float((low + high) / 2)
 
 
-def _next_term(problem: Problem, accepted: list[Candidate], to_beat: float) -> Refit | None:
-    """The refit of the term that the scan puts first, on top of those accepted."""
+def _next_term(problem: Problem, to_beat: float) -> Refit | None:
+    """The refit of the term that the scan puts first, on top of those that are there."""
     at = problem.base
-    left = [
-        c
-        for c in problem.whole.candidates.values()
-        if c.cause.name.startswith("law[") and c not in accepted
-    ]
+    candidates = problem.whole.candidates.values()
+    left = [c for c in candidates if is_law(c.name) and c not in problem.added]
     profiles = scan(problem.whole, at.windows, at.unknowns, at.point, left, at.derivatives)
     if not profiles or profiles[0].drop <= to_beat:
         return None
@@ -109,18 +124,20 @@ def _counted_from(first: Problem, found: Refit) -> Refit:
     return replace(found, drop_train=train)
 
 
-def _law(problem: Problem, best: Refit, accepted: list[Candidate]) -> Law:
+def _law(best: Refit, steps: list[LawTerm]) -> Law:
     values = best.fit.plant.values
+    accepted = [step.candidate for step in steps]
     terms = {c.strength: values[c.strength] for c in accepted}
     text = " and ".join(
         f"a term in {c.cause.drivers[0]} on {c.place} ({c.cause.strength} = {size:.3g})"
         for c, size in zip(accepted, terms.values(), strict=True)
     )
     windows = best.fit.windows
-    ranges = {
-        name: (float(np.nanmin(rows)), float(np.nanmax(rows)))
-        for name, rows in zip(windows.plant.measured, windows.measured, strict=True)
-    }
+    ranges = seen_in(windows.plant.lean(keep=_members(accepted)), windows.recordings)
     balance = f"{accepted[0].place}.{accepted[0].cause.balance.value}"
     drops = (best.drop_train, best.drop_validation)
-    return Law(balance, terms, ranges, *drops, text, best.fit, best.validation)
+    return Law(balance, terms, ranges, *drops, text, tuple(steps), best.fit, best.validation)
+
+
+def _members(candidates: Iterable[Candidate]) -> list[str]:
+    return [candidate.member for candidate in candidates]

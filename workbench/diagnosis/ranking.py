@@ -14,6 +14,7 @@ from workbench.diagnosis.shifts import LEAVES_PRIOR, Shift
 from workbench.effect import Kind
 from workbench.fitting.problem import Problem
 from workbench.plant import Candidate
+from workbench.rig_laws import is_law
 
 
 def ranked(
@@ -49,7 +50,8 @@ def ranked(
 def _not_asked(problem: Problem, asked: set[str]) -> list[Ranked]:
     """Causes of the rig's plant without a row yet: measured here, or there already.
 
-    Where the recording measures what a cause produces, the cause has no place.
+    Where the recording measures what a cause produces, the cause has no place.  Empirical terms
+    that the rig has are no causes.
     """
     nothing = float("nan")
     return [
@@ -66,7 +68,7 @@ def _not_asked(problem: Problem, asked: set[str]) -> list[Ranked]:
             reasons=(_reason_not_asked(problem, candidate),),
         )
         for name, candidate in problem.rig.plant.candidates.items()
-        if name not in asked
+        if name not in asked and not is_law(name)
     ]
 
 

@@ -5,12 +5,13 @@ Each begins where its first fit (:mod:`workbench.diagnosis.rough`) ended (diagno
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from workbench.diagnosis.result import Size
-from workbench.diagnosis.rough import Rough
+from workbench.diagnosis.rough import Rough, windows_for
 from workbench.diagnosis.shifts import Shift
 from workbench.fitting.error_model import OUTLYING
 from workbench.fitting.errors import plain_ratio
@@ -61,6 +62,19 @@ def refit(problem: Problem, begun: Rough) -> Refit:
         absent = Point(unknowns.clipped(unknowns.scaled(values)), starts)
         fit = fit_windows(windows, unknowns, absent, ITERATIONS)
     return _refit(problem, candidate, fit, names)
+
+
+def refit_from(problem: Problem, candidate: Candidate, values: Mapping[str, float]) -> Refit:
+    """Fit a candidate from where a fit of the same effects ended, by its parameter values."""
+    windows = windows_for(problem, candidate)
+    unknowns = problem.unknowns(windows.plant, candidate)
+    shapes = [f"{candidate.member}.{key}" for key in candidate.cause.shapes]
+    held = {name: values[name] for name in shapes if name not in unknowns.names}
+    unknowns = replace(unknowns, held={**unknowns.held, **held})
+    t = unknowns.clipped(unknowns.scaled({**windows.plant.values, **values}))
+    starts = carried(problem.base.point.starts, problem.base.windows, windows)
+    fit = fit_windows(windows, unknowns, Point(t, starts), ITERATIONS)
+    return _refit(problem, candidate, fit, (candidate.strength, *candidate.forms))
 
 
 def _probes(fit: Fit, names: tuple[str, ...]) -> list[Point]:

@@ -136,12 +136,23 @@ class Where:
 
 
 @dataclass(frozen=True)
+class LawTerm:
+    """One term on top of those before it: fit, held-out fit, and the shares that it removes."""
+
+    candidate: Candidate
+    fit: Fit = field(repr=False)
+    validation: Fit | None = field(repr=False)
+    drop_train: float
+    drop_validation: float
+
+
+@dataclass(frozen=True)
 class Law:
     """An empirical law for a balance that no effect of the catalogue explains.
 
     ``terms`` are coefficients in SI by full parameter name; ``ranges`` the range of each measured
-    output in which it was seen; ``fit`` and ``validation`` as of a refit.  It is not a physical
-    effect.
+    output, and of the speed of bodies, in which it was seen; ``steps`` its terms one after the
+    other; ``fit`` and ``validation`` as of a refit.  It is not a physical effect.
     """
 
     balance: str
@@ -150,6 +161,7 @@ class Law:
     drop_train: float
     drop_validation: float
     text: str
+    steps: tuple[LawTerm, ...] = ()
     fit: Fit | None = field(default=None, repr=False)
     validation: Fit | None = field(default=None, repr=False)
 

@@ -23,6 +23,7 @@ from workbench.fitting.problem import Problem, staged
 from workbench.fitting.start_states import carried
 from workbench.fitting.unknowns import Unknowns
 from workbench.fitting.windows import Windows
+from workbench.plant import Candidate
 
 STARTS = 2  # sizes of the scan that are tried
 SHARES = (2.0, 1.0, 0.5, 0.0)  # of the linear step of the nuisances that goes with each
@@ -43,10 +44,7 @@ class Rough:
 def rough_fit(problem: Problem, profile: Profile) -> Rough:
     """Fit the candidate of a profile from its best sizes, in a few steps."""
     candidate, base = profile.candidate, problem.base
-    windows = base.windows
-    if candidate.strength not in windows.plant.values:
-        needed = [c.member for c in problem.added] + [candidate.member]
-        windows = windows.with_plant(staged(problem.whole, *needed))
+    windows = windows_for(problem, candidate)
     unknowns = _with_shape(problem, problem.unknowns(windows.plant, candidate), profile)
     begun = [
         points_costs(windows, unknowns, points).best
@@ -59,6 +57,15 @@ def rough_fit(problem: Problem, profile: Profile) -> Rough:
         tried.append(fit_windows(windows, unknowns, start, ITERATIONS, at))
     fit = min(tried, key=lambda each: each.cost)
     return Rough(profile, fit, (base.cost - fit.cost) / problem.misfit)
+
+
+def windows_for(problem: Problem, candidate: Candidate) -> Windows:
+    """The windows of the base, their plant with the states that a candidate needs."""
+    windows = problem.base.windows
+    if candidate.strength in windows.plant.values:
+        return windows
+    needed = [c.member for c in problem.added] + [candidate.member]
+    return windows.with_plant(staged(problem.whole, *needed))
 
 
 def _with_shape(problem: Problem, unknowns: Unknowns, profile: Profile) -> Unknowns:

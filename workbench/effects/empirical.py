@@ -1,13 +1,15 @@
 """Empirical terms: what is left when no effect of the catalogue explains a misfit.
 
 They are not physical effects and stand in no catalogue.  Each is one simple function of one or two
-driving variables in one balance, and a law is a sum of at most three.
+driving variables in one balance, with one coefficient, and a law is a sum of at most three.  A rig
+file takes them like effects: ``add = ["law[v|v|]@slide"]``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from math import inf
 
 from workbench.effect import (
     Balance,
@@ -17,80 +19,148 @@ from workbench.effect import (
     Expression,
     Force,
     MassFlow,
+    form,
     strength,
 )
 
 SOURCE = "diagnosis.md 1.9: sparse law of one balance"
+ROUND_M, ROUND_M_S = 1e-6, 1e-6  # where |x| and |v| turn smoothly
 
 
-def _term(name: str, balance: Balance, driver: str) -> Cause:
-    return Cause(
-        name=f"law[{name}]",
-        strength=name,
+def _cause(driver: str, coefficient: str, balance: Balance) -> tuple[Cause, ...]:
+    cause = Cause(
+        name=f"law[{driver}]",
+        strength=coefficient,
         balance=balance,
         drivers=(driver,),
         shown_by="the recording at hand",
         source=SOURCE,
         sizes=(0.1, 0.3, 1.0),
     )
+    return (cause,)
 
 
 @dataclass(frozen=True, kw_only=True)
 class EmpiricalForce(Effect):
-    """A sum of plain terms on a body.
-
-    F = -a v |v| - b v^3 - c v |x - x_m| + e (x - x_m)^2
+    """A plain term on a body, F(v, x) in N.
 
     What grows with a power of the speed may drive the body only a little: it would run away.
 
     Source: diagnosis.md 1.9.
     """
 
-    causes = (
-        _term("quadratic_n_s2_m2", Balance.MOMENTUM, "v|v|"),
-        _term("cubic_n_s3_m3", Balance.MOMENTUM, "v^3"),
-        _term("placed_viscous_n_s_m2", Balance.MOMENTUM, "v|x - mid|"),
-        _term("curved_n_m2", Balance.MOMENTUM, "(x - mid)^2"),
-    )
-
     body: str
-    middle_m: float = 0.0
-    quadratic_n_s2_m2: Expression = strength(typical=300.0, lower=-30.0, upper=1e5)
-    cubic_n_s3_m3: Expression = strength(typical=500.0, lower=-15.0, upper=1e5)
-    placed_viscous_n_s_m2: Expression = strength(typical=500.0, lower=-1e5, upper=1e5)
-    curved_n_m2: Expression = strength(typical=2000.0, lower=-1e6, upper=1e6)
+
+    def force_n(self, velocity_m_s: Expression, position_m: Expression) -> Expression:
+        """The force at a speed and a place; a subclass says it."""
+        raise NotImplementedError
 
     def terms(self, now: Conditions) -> Iterator[Force]:
-        v, x = now[self.body].velocity_m_s, now[self.body].position_m - self.middle_m
-        speed = (v**2 + 1e-12) ** 0.5
-        distance = (x**2 + 1e-12) ** 0.5
-        force_n = -self.quadratic_n_s2_m2 * v * speed - self.cubic_n_s3_m3 * v**3
-        force_n += -self.placed_viscous_n_s_m2 * v * distance + self.curved_n_m2 * x**2
-        yield Force(self.body, force_n)
+        here = now[self.body]
+        yield Force(self.body, self.force_n(here.velocity_m_s, here.position_m))
+
+
+@dataclass(frozen=True, kw_only=True)
+class SquareDrag(EmpiricalForce):
+    """F = -a v |v|."""
+
+    causes = _cause("v|v|", "quadratic_n_s2_m2", Balance.MOMENTUM)
+    quadratic_n_s2_m2: Expression = strength(typical=300.0, lower=-30.0, upper=1e5)
+
+    def force_n(self, velocity_m_s: Expression, position_m: Expression) -> Expression:
+        return -self.quadratic_n_s2_m2 * velocity_m_s * _size(velocity_m_s, ROUND_M_S)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CubicDrag(EmpiricalForce):
+    """F = -b v^3."""
+
+    causes = _cause("v^3", "cubic_n_s3_m3", Balance.MOMENTUM)
+    cubic_n_s3_m3: Expression = strength(typical=500.0, lower=-15.0, upper=1e5)
+
+    def force_n(self, velocity_m_s: Expression, position_m: Expression) -> Expression:
+        return -self.cubic_n_s3_m3 * velocity_m_s**3
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlacedDrag(EmpiricalForce):
+    """F = -c v |x - x_m|, with x_m the middle of the recorded stroke."""
+
+    causes = _cause("v|x - mid|", "placed_viscous_n_s_m2", Balance.MOMENTUM)
+    placed_viscous_n_s_m2: Expression = strength(typical=500.0, lower=-1e5, upper=1e5)
+    middle_m: Expression = form(0.0, lower=-inf)
+
+    def force_n(self, velocity_m_s: Expression, position_m: Expression) -> Expression:
+        away_m = _size(position_m - self.middle_m, ROUND_M)
+        return -self.placed_viscous_n_s_m2 * velocity_m_s * away_m
+
+
+@dataclass(frozen=True, kw_only=True)
+class CurvedForce(EmpiricalForce):
+    """F = e (x - x_m)^2, with x_m the middle of the recorded stroke."""
+
+    causes = _cause("(x - mid)^2", "curved_n_m2", Balance.MOMENTUM)
+    curved_n_m2: Expression = strength(typical=2000.0, lower=-1e6, upper=1e6)
+    middle_m: Expression = form(0.0, lower=-inf)
+
+    def force_n(self, velocity_m_s: Expression, position_m: Expression) -> Expression:
+        return self.curved_n_m2 * (position_m - self.middle_m) ** 2
 
 
 @dataclass(frozen=True, kw_only=True)
 class EmpiricalFlow(Effect):
-    """mdot = w0 + w1 (p / p_s) + w2 |v| into a chamber, with the temperature of the chamber.
+    """A plain flow into a chamber in kg/s, with the temperature of the chamber.
 
     Source: diagnosis.md 1.9.
     """
 
-    causes = (
-        _term("constant_kg_s", Balance.MASS, "constant"),
-        _term("pressure_kg_s", Balance.MASS, "p/p_s"),
-        _term("speed_kg_m", Balance.MASS, "|v|"),
-    )
-
     chamber: str
-    body: str
-    constant_kg_s: Expression = strength(typical=1e-4, lower=-1e-2, upper=1e-2)
-    pressure_kg_s: Expression = strength(typical=1e-4, lower=-1e-2, upper=1e-2)
-    speed_kg_m: Expression = strength(typical=5e-4, lower=-1e-1, upper=1e-1)
+
+    def flow_kg_s(self, now: Conditions) -> Expression:
+        """The flow under these conditions; a subclass says it."""
+        raise NotImplementedError
 
     def terms(self, now: Conditions) -> Iterator[MassFlow]:
-        gas, supply = now[self.chamber], now["supply"]
-        v = now[self.body].velocity_m_s
-        flow = self.constant_kg_s + self.speed_kg_m * (v**2 + 1e-12) ** 0.5
-        flow += self.pressure_kg_s * gas.pressure_pa / supply.pressure_pa
-        yield MassFlow(self.chamber, flow, gas.temperature_k)
+        yield MassFlow(self.chamber, self.flow_kg_s(now), now[self.chamber].temperature_k)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConstantFlow(EmpiricalFlow):
+    """mdot = w."""
+
+    causes = _cause("constant", "constant_kg_s", Balance.MASS)
+    constant_kg_s: Expression = strength(typical=1e-4, lower=-1e-2, upper=1e-2)
+
+    def flow_kg_s(self, now: Conditions) -> Expression:
+        return self.constant_kg_s
+
+
+@dataclass(frozen=True, kw_only=True)
+class PressureFlow(EmpiricalFlow):
+    """mdot = w p / p_s."""
+
+    causes = _cause("p/p_s", "pressure_kg_s", Balance.MASS)
+    pressure_kg_s: Expression = strength(typical=1e-4, lower=-1e-2, upper=1e-2)
+
+    def flow_kg_s(self, now: Conditions) -> Expression:
+        return self.pressure_kg_s * now[self.chamber].pressure_pa / now["supply"].pressure_pa
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpeedFlow(EmpiricalFlow):
+    """mdot = w |v| with the speed of the body that closes the chamber."""
+
+    causes = _cause("|v|", "speed_kg_m", Balance.MASS)
+    body: str
+    speed_kg_m: Expression = strength(typical=5e-4, lower=-1e-1, upper=1e-1)
+
+    def flow_kg_s(self, now: Conditions) -> Expression:
+        return self.speed_kg_m * _size(now[self.body].velocity_m_s, ROUND_M_S)
+
+
+FORCES: tuple[type[EmpiricalForce], ...] = (SquareDrag, CubicDrag, PlacedDrag, CurvedForce)
+
+
+def _size(value: Expression, rounding: float) -> Expression:
+    """|value|, with a derivative everywhere."""
+    return (value**2 + rounding**2) ** 0.5

@@ -9,7 +9,9 @@ import numpy as np
 
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.linearised import normal_equations, rescaled
+from workbench.law_range import seen_in
 from workbench.rig import Rig
+from workbench.rig_laws import laws_of
 
 
 def posterior_deviation(fit: Fit) -> np.ndarray:
@@ -32,8 +34,11 @@ def posterior_covariance(fit: Fit) -> np.ndarray:
     return np.linalg.inv(normal_equations(at, fit.unknowns).hessian)
 
 
-def fitted_rig(rig: Rig, fit: Fit, added: Sequence[str], note: str = "") -> Rig:
-    """The rig at fitted values with their standard deviations, and one note more."""
+def fitted_rig(rig: Rig, fit: Fit, added: Sequence[str] = ()) -> Rig:
+    """The rig at fitted values with their standard deviations.
+
+    Empirical terms were seen where the fitted recordings went.
+    """
     ours = rig.plant.values
     found = fit.unknowns.values(fit.point.t)
     values = {name: value for name, value in found.items() if name in ours}
@@ -43,5 +48,5 @@ def fitted_rig(rig: Rig, fit: Fit, added: Sequence[str], note: str = "") -> Rig:
         plant=rig.plant.with_values(values),
         added=(*rig.added, *added),
         deviations={**rig.deviations, **{n: d for n, d in deviations.items() if d > 0}},
-        notes=(*rig.notes, note) if note else rig.notes,
+        seen=seen_in(rig.plant, fit.windows.recordings) if laws_of(rig.plant) else {},
     )

@@ -1,0 +1,140 @@
+"""An improvement as text and as a document: the falling error, and the second thoughts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from studies.documents import Document, errors, law_document, plain
+from studies.text import columns, number, percent
+from studies.text_of_results import before_after_text, law_text, moved_text
+from workbench.units import public_name, si_unit
+
+if TYPE_CHECKING:
+    from workbench.diagnosis.improvement import Improvement
+    from workbench.diagnosis.passes import Removal, Swap
+
+FREE_RUNS = (
+    "free runs over whole recordings (no judge where positions integrate: the right effect can "
+    "make them worse until the next one is there):"
+)
+
+
+def improvement_text(found: Improvement, unit_of: Mapping[str, str]) -> str:
+    """The falling error, what was added and thought over, errors and parameters."""
+    head = ("with", "", "chi2 per sample, training", "validation")
+    rows = [
+        (stage.label, stage.change.value, number(stage.train), number(stage.validation))
+        for stage in found.budget
+    ]
+    parts = [columns(head, rows), ""]
+    parts += [f"diagnosis {k}: {d.sentence}" for k, d in enumerate(found.diagnoses, start=1)]
+    parts += thoughts_text(found)
+    if found.law:
+        parts += ["", "nothing of the catalogue earns its place any more; taken at the end:"]
+        parts += [law_text(found.law)]
+    if found.parameters:
+        parts += ["", before_after_text(found.before, found.after, unit_of)]
+        if found.free_before:
+            free = before_after_text(found.free_before, found.free_after, unit_of)
+            parts += ["", FREE_RUNS, free]
+        parts += ["", moved_text(found.parameters)]
+    return "\n".join(parts)
+
+
+def thoughts_text(found: Improvement) -> list[str]:
+    """The backward and the swap pass as tables; nothing where there was nothing to think over."""
+    parts = []
+    if found.removals:
+        head = ("backward pass", "removes of training", "of validation", "")
+        rows = [
+            (
+                each.candidate.name,
+                percent(each.share_train, 1),
+                percent(each.share_validation, 1),
+                _stays(each),
+            )
+            for each in found.removals
+        ]
+        parts += ["", columns(head, rows)]
+    if found.swaps:
+        head = ("swap pass", "removes of training", "of validation", "")
+        rows = [row for each in found.swaps for row in _rivals(each)]
+        parts += ["", columns(head, rows)]
+    return parts
+
+
+def _stays(each: Removal) -> str:
+    if each.dropped:
+        return f"dropped: {'; '.join(each.reasons)}"
+    return f"stays: {'; '.join(each.reasons)}" if each.reasons else "stays"
+
+
+def _rivals(each: Swap) -> list[tuple[str, str, str, str]]:
+    verdict = "takes its place" if each.replaced else "not clearly better"
+    shares = ((each.share_train, each.share_validation), (each.rival_train, each.rival_validation))
+    (a, b), (c, d) = ((percent(x, 1), percent(y, 1)) for x, y in shares)
+    return [
+        (each.candidate.name, a, b, ""),
+        (f"  or {each.rival.name}", c, d, verdict),
+    ]
+
+
+def improvement_document(found: Improvement, unit_of: Mapping[str, str]) -> Document:
+    """An improvement: what is kept, the budget, both passes, errors and parameters in SI."""
+    return {
+        "schema": "workbench.improvement/1",
+        "rig": found.rig.name,
+        "kept": list(found.kept),
+        "budget": [
+            {
+                "with": stage.label,
+                "change": stage.change.value,
+                "train": plain(stage.train),
+                "validation": plain(stage.validation),
+            }
+            for stage in found.budget
+        ],
+        "diagnoses": [each.sentence for each in found.diagnoses],
+        "removals": [
+            {
+                "effect": each.candidate.name,
+                "share_train": plain(each.share_train),
+                "share_validation": plain(each.share_validation),
+                "reasons": list(each.reasons),
+                "dropped": each.dropped,
+            }
+            for each in found.removals
+        ],
+        "swaps": [
+            {
+                "effect": each.candidate.name,
+                "rival": each.rival.name,
+                "share_train": plain(each.share_train),
+                "share_validation": plain(each.share_validation),
+                "rival_share_train": plain(each.rival_train),
+                "rival_share_validation": plain(each.rival_validation),
+                "replaced": each.replaced,
+            }
+            for each in found.swaps
+        ],
+        "law": law_document(found.law) if found.law else None,
+        "before": errors(found.before, unit_of),
+        "after": errors(found.after, unit_of),
+        "free_run": {
+            "before": errors(found.free_before, unit_of),
+            "after": errors(found.free_after, unit_of),
+        },
+        "parameters": [
+            {
+                "name": public_name(row.name),
+                "unit": si_unit(row.name),
+                "before": plain(row.before),
+                "before_std": plain(row.prior_deviation),
+                "after": plain(row.after),
+                "after_std": plain(row.deviation),
+            }
+            for row in found.parameters
+        ],
+        "stopped": found.stopped,
+    }

@@ -1,0 +1,202 @@
+"""Empirical laws as effects of a rig file: found, taken, written, read, and left behind.
+
+The truth of the bench is written in plain numpy, here and in ``test_diagnosis``.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from commands import call
+from test_diagnosis import bench, nothing
+
+from studies.documents import diagnosis_document
+from studies.improvement_text import improvement_text
+from studies.text_of_results import unit_names
+from workbench.comparison import compare
+from workbench.comparison.run import run
+from workbench.diagnosis.addition import add, add_law
+from workbench.diagnosis.improve import improve
+from workbench.diagnosis.improvement import Change
+from workbench.diagnosis.result import Verdict
+from workbench.errors import InputError
+from workbench.fitting.fit import fit
+from workbench.recording import Recording
+from workbench.rig import default_rig, load_rig
+from workbench.rig_laws import law_terms
+from workbench.rig_writing import rig_text
+from workbench.simulation import simulate
+
+BARE = 'name = "bench"\nplant = "cylinder_bench"\n[values]\n"chamber.area" = "518.7 mm^2"\n'
+CURVE_N_M2 = 6e3
+CURVED, DRAG = "law[(x - mid)^2]@rod", "law[v|v|]@slide"
+UNITS = {"rod.force": "rod.force_n"}
+LAW_RIG = f"""name = "drive"
+plant = "servo_drive"
+[effects]
+add = ["{DRAG}"]
+[values]
+"{DRAG}.quadratic" = "200 N s^2/m^2"
+[seen]
+"slide.position" = ["30 mm", "250 mm"]
+"slide.velocity" = ["-0.3 m/s", "0.3 m/s"]
+"""
+
+
+def curved(seed, gauge_pa=3e5, wider=1.0):
+    """The bench with a force that grows with the square of the place, which no catalogue has."""
+    found = bench(seed, nothing, gauge_pa=gauge_pa)
+    x = wider * found["rod.position_m"]
+    channels = {"rod.position_m": x, "rod.force_n": found["rod.force_n"] - CURVE_N_M2 * x**2}
+    return replace(found, channels={**found.channels, **channels})
+
+
+@pytest.fixture(scope="module")
+def rig():
+    return load_rig(BARE)
+
+
+@pytest.fixture(scope="module")
+def lawful(rig):
+    """The bench with the empirical law of the curve, found and taken."""
+    return improve(rig, [curved(1), curved(3, 1e5)], [curved(2, 4e5)], law=True)
+
+
+def test_no_empirical_term_stands_in_a_ranking(lawful):
+    for diagnosis in lawful.diagnoses:
+        assert not any(row.candidate.name.startswith("law[") for row in diagnosis.ranking)
+
+
+def test_where_nothing_of_the_catalogue_helps_the_law_is_taken_and_said_to_be_empirical(lawful):
+    found, last = lawful.rig, lawful.diagnoses[-1]
+    text = rig_text(found)
+
+    assert last.verdict is Verdict.NOT_IN_CATALOGUE
+    assert lawful.law is last.law
+    assert CURVED in lawful.kept and CURVED in found.added
+    assert lawful.budget[-1].change is Change.LAW
+    assert lawful.budget[-1].validation < 0.1 * lawful.budget[-2].validation
+    assert found.plant.values[f"{CURVED}.curved_n_m2"] == pytest.approx(CURVE_N_M2, rel=0.02)
+    assert found.plant.values[f"{CURVED}.middle_m"] == pytest.approx(0.0, abs=1e-4)
+    (note,) = [line for line in text.splitlines() if line.startswith(f"# accepted: {CURVED}")]
+    assert "empirical, not a physical effect" in note
+    assert "rod.position -30 to 30 mm" in note
+    assert "empirical" in improvement_text(lawful, UNITS)
+    document = diagnosis_document(last, unit_names(found.plant.measured))
+    assert document["law"]["add"] == [CURVED] and document["law"]["kind"] == "empirical"
+
+
+def test_a_law_is_taken_only_where_it_is_asked_for(rig):
+    found = improve(rig, [curved(1), curved(3, 1e5)], [curved(2, 4e5)])
+
+    assert found.law is None
+    assert not any(name.startswith("law[") for name in found.rig.added)
+
+
+def test_a_rig_with_a_law_reads_back_as_the_same_model(lawful):
+    again = load_rig(rig_text(lawful.rig))
+
+    assert again.plant == lawful.rig.plant
+    assert (again.added, again.notes) == (lawful.rig.added, lawful.rig.notes)
+    assert (again.seen, again.deviations) == (lawful.rig.seen, lawful.rig.deviations)
+
+
+def test_leaving_the_range_of_a_law_warns_and_staying_inside_does_not(lawful, recwarn):
+    compare(lawful.rig, [curved(2, 2e5)])
+    run(lawful.rig, curved(2, 2e5))
+    assert not recwarn.list
+
+    with pytest.warns(UserWarning, match=r"rod\.position runs from -45 to 45 mm in bench 2; the "):
+        compare(lawful.rig, [curved(2, 2e5, wider=1.5)])
+    with pytest.warns(UserWarning, match=r"rod\.position runs from -45 to 45 mm"):
+        run(lawful.rig, curved(2, 2e5, wider=1.5))
+
+
+def test_a_fit_moves_a_law_and_tells_where_it_was_seen_then(lawful):
+    found = fit(lawful.rig, [curved(5, 3e5, wider=1.2)])
+
+    assert found.rig.seen["rod.position_m"] == pytest.approx((-0.036, 0.036), abs=1e-4)
+    assert f"{CURVED}.curved_n_m2" in [row.name for row in found.rows]
+
+
+def test_a_law_can_be_added_by_name_and_as_a_whole(rig):
+    train, held_out = [curved(1), curved(3, 1e5)], [curved(2, 4e5)]
+    one, whole = add(rig, CURVED, train, held_out), add_law(rig, train, held_out)
+
+    assert [step.candidate.name for step in whole] == [CURVED]
+    name = f"{CURVED}.curved_n_m2"
+    assert one.rig.plant.values[name] == pytest.approx(whole[0].rig.plant.values[name], rel=0.01)
+    with pytest.raises(ValueError, match="no empirical law"):
+        add_law(rig, [bench(1, nothing)], [bench(2, nothing)])
+    with pytest.raises(ValueError, match="has it already"):
+        add(one.rig, CURVED, train, held_out)
+
+
+def test_every_term_of_every_plant_acts_and_is_absent_at_null(plant):
+    rng = np.random.default_rng(5)
+    for name, term in law_terms(plant).items():
+        with_it = plant.with_effects(term)
+        (candidate,) = [c for c in with_it.candidates.values() if c.name == name]
+        known = with_it.parameters[candidate.strength]
+        x = plant.initial + plant.scale * rng.uniform(0.1, 0.5, len(plant.scale))
+        u, d, _ = plant.nominal
+        d = d + 0.01
+        bare, null = plant.model.f(x, u, d, plant.nominal[2]), with_it.model.f
+        strong = with_it.with_values({candidate.strength: known.typical})
+        for got, same in zip(bare, null(x, u, d, with_it.nominal[2]), strict=True):
+            assert np.array_equal(np.array(got), np.array(same)), name
+        changed = [
+            np.abs(np.array(a) - np.array(b)).max(initial=0.0)
+            for a, b in zip(bare, null(x, u, d, strong.nominal[2]), strict=True)
+        ]
+        assert max(changed) > 0.0, name
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (f'add = ["{DRAG}"]', 'add = ["law[v|v]@slide"]', "did you mean 'law[v|v|]@slide'"),
+        ('["30 mm", "250 mm"]', '["30 mm"]', "is no range; expected a list of two"),
+        ('["30 mm", "250 mm"]', '["300 mm", "250 mm"]', "begins above its end"),
+        ('["30 mm", "250 mm"]', '["30 V", "250 mm"]', "unit 'V' does not fit"),
+        ('"slide.velocity" =', '"slide.velocit" =', "did you mean 'slide.velocity'"),
+        (f'add = ["{DRAG}"]\n[values]\n"{DRAG}.quadratic" = "200 N s^2/m^2"', "",
+         "is the range of an empirical law, and [effects] adds none"),
+    ],
+)  # fmt: skip
+def test_a_law_that_is_mistyped_is_refused_with_its_place(old, new, said):
+    with pytest.raises(InputError) as refused:
+        load_rig(LAW_RIG.replace(old, new))
+
+    assert said in str(refused.value)
+
+
+def test_the_command_names_the_terms_there_are(tmp_path):
+    (tmp_path / "rig.toml").write_text(LAW_RIG)
+    rows = "\n".join(f"{1e-3 * k:.3f},4.95" for k in range(400))
+    (tmp_path / "train.csv").write_text(f"time,valve.command\ns,V\n{rows}\n")
+    words = ("--fit", tmp_path / "train.csv", "-o", tmp_path / "rig2.toml")
+    answer = call("add", tmp_path / "rig.toml", "law[v^2]@slide", *words)
+
+    assert answer.exit_code == 2
+    assert "law[v^3]@slide" in answer.stderr
+    assert "law[v|v|]@slide" in call("add", "--help").output
+    assert "--law" in call("improve", "--help").output
+
+
+def test_a_rig_with_a_law_simulates_and_has_modes(tmp_path):
+    (tmp_path / "rig.toml").write_text(LAW_RIG)
+    rows = "\n".join(f"{1e-3 * k:.3f},{6.5 if k > 20 else 4.95}" for k in range(400))
+    (tmp_path / "commands.csv").write_text(f"time,valve.command\ns,V\n{rows}\n")
+    out = tmp_path / "simulated.csv"
+    answer = call("simulate", tmp_path / "rig.toml", tmp_path / "commands.csv", "-o", out)
+    modes = call("modes", tmp_path / "rig.toml", "--json", tmp_path / "modes.json")
+
+    assert answer.exit_code == 0, answer.output
+    assert "slide.velocity runs from" in answer.stderr
+    assert modes.exit_code == 0, modes.output
+    free = default_rig("servo_drive").plant
+    lean, dragged = (p.lean() for p in (free, load_rig(LAW_RIG).plant))
+    recording = Recording("up", 1e-3, {"valve.command_v": np.full(400, 6.5)})
+    speeds = [simulate(each, recording)["slide.velocity_m_s"].max() for each in (lean, dragged)]
+    assert speeds[1] < speeds[0]

@@ -1,0 +1,255 @@
+"""One effect, or one term of an empirical law, added to a rig and fitted."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+
+from workbench.diagnosis.diagnose import WEAK_EVIDENCE, Progress, silent
+from workbench.diagnosis.law import empirical_law, plant_with_terms
+from workbench.diagnosis.refit import refit
+from workbench.diagnosis.result import Diagnosis, Law
+from workbench.diagnosis.rough import rough_fit
+from workbench.diagnosis.scan import scan
+from workbench.fitting.errors import Errors, errors_of
+from workbench.fitting.gauss_newton import Fit
+from workbench.fitting.posterior import fitted_rig, posterior_deviation
+from workbench.fitting.problem import Problem, pose, split
+from workbench.law_range import ranges_text
+from workbench.plant import Candidate, require
+from workbench.recording import Recording
+from workbench.rig import Rig
+from workbench.rig_laws import is_law
+
+NO_LAW = "no empirical law of up to three terms passes every criterion"
+
+
+@dataclass(frozen=True)
+class Moved:
+    """One parameter before and after: values, posterior and prior standard deviations in SI.
+
+    What was added has no prior: its ``prior_deviation`` is infinite.
+    """
+
+    name: str
+    before: float
+    after: float
+    deviation: float
+    prior_deviation: float
+
+
+@dataclass(frozen=True)
+class Addition:
+    """One effect added and fitted: the new rig, errors before and after, parameters."""
+
+    rig: Rig
+    candidate: Candidate
+    before: Errors
+    after: Errors
+    drop_train: float
+    drop_validation: float
+    parameters: tuple[Moved, ...]
+    fit: Fit = field(repr=False)
+    validation_fit: Fit | None = field(repr=False)
+
+
+def add(
+    rig: Rig,
+    name: str,
+    train: Sequence[Recording],
+    validation: Sequence[Recording] = (),
+    progress: Progress = silent,
+) -> Addition:
+    """Add one effect of the catalogue, or one empirical term, to a rig and refit.
+
+    Raises
+    ------
+    KeyError
+        If the plant has no such effect for these recordings, with the nearest name.
+    ValueError
+        If the effect is there already, only a shift of a parameter that is fitted anyway, fixed by
+        the rig, or a change of something that the plant lacks.
+    """
+    train, validation = _with_held_out(train, validation)
+    if is_law(name):
+        rig = replace(rig, plant=plant_with_terms(rig.plant, train, [name]))
+    plant = rig.fit_for(train[0])
+    require([name], plant.candidates, plant.name)
+    candidate = plant.candidates[name]
+    progress("prior fit")
+    problem = pose(rig, train, validation)
+    if candidate in problem.added or _present(problem, candidate):
+        raise ValueError(f"{name}: {rig.name} has it already; fit moves it")
+    if not plant.ready_for(candidate):
+        raise ValueError(f"{name}: nothing without {candidate.member}.{candidate.cause.needs}")
+    if candidate.strength in rig.fixed:
+        raise ValueError(f"{name}: {rig.name} fixes {candidate.strength}: nothing to fit")
+    progress(f"refit with {name}")
+    base = problem.base
+    profiles = scan(problem.whole, base.windows, base.unknowns, base.point, [candidate])
+    found = refit(problem, rough_fit(problem, profiles[0]))
+    before = errors_of(base, problem.base_validation)
+    drops = (found.drop_train, found.drop_validation)
+    return addition(rig, before, candidate, found.fit, found.validation, drops)
+
+
+def add_law(
+    rig: Rig,
+    train: Sequence[Recording],
+    validation: Sequence[Recording] = (),
+    progress: Progress = silent,
+) -> tuple[Addition, ...]:
+    """Add the empirical law of up to three terms that explains most, term by term.
+
+    Raises
+    ------
+    ValueError
+        If none passes the criteria that an effect must pass.
+    """
+    train, validation = _with_held_out(train, validation)
+    progress("prior fit")
+    problem = pose(rig, train, validation)
+    progress("empirical law")
+    law = empirical_law(problem)
+    if law is None:
+        raise ValueError(f"{rig.name}: {NO_LAW}")
+    return accept_law(rig, law, errors_of(problem.base, problem.base_validation))
+
+
+def _with_held_out(
+    train: Sequence[Recording], validation: Sequence[Recording]
+) -> tuple[Sequence[Recording], Sequence[Recording]]:
+    """Recordings to train on and to hold out; a third of the first where there are no others."""
+    if validation:
+        return train, validation
+    warnings.warn(WEAK_EVIDENCE, stacklevel=3)
+    return split(train)
+
+
+def accept(rig: Rig, diagnosis: Diagnosis) -> Addition:
+    """What the ranking of a diagnosis puts first, added to the rig as it was fitted there.
+
+    Raises
+    ------
+    ValueError
+        If the first of the ranking was not refitted.
+    """
+    best = diagnosis.ranking[0] if diagnosis.ranking else None
+    if best is None or best.fit is None:
+        raise ValueError(f"{diagnosis.rig_name}: the diagnosis followed no candidate to a refit")
+    drops = (best.drop_train, best.drop_validation)
+    return addition(rig, diagnosis.before, best.candidate, best.fit, best.validation, drops)
+
+
+def accept_law(rig: Rig, law: Law, before: Errors) -> tuple[Addition, ...]:
+    """The terms of an empirical law added to the rig one after the other, as they were fitted.
+
+    ``before`` are the errors without any of them.
+    """
+    steps: list[Addition] = []
+    for term in law.steps:
+        name, recordings = term.candidate.name, term.fit.windows.recordings
+        rig = replace(rig, plant=plant_with_terms(rig.plant, recordings, [name]))
+        drops = (term.drop_train, term.drop_validation)
+        step = addition(rig, before, term.candidate, term.fit, term.validation, drops)
+        steps.append(step)
+        rig = replace(freed(rig, step), notes=step.rig.notes)
+        before = step.after
+    return tuple(steps)
+
+
+def _present(problem: Problem, candidate: Candidate) -> bool:
+    """True where the base fit moves the cause already."""
+    moved = problem.base.unknowns.names
+    return candidate.held in moved or (
+        candidate.strength in moved and not candidate.cause.tolerated
+    )
+
+
+def assembled(rig: Rig, steps: Sequence[Addition]) -> Rig:
+    """The rig with its own priors, what the steps added free, and their notes.
+
+    What an earlier or later step moved beside its own effect stays as the rig has it.
+    """
+    own = {name for step in steps for name in _names(step.candidate)}
+    found = rig
+    for step in steps:
+        found = freed(found, step, own)
+    kept = [line for step in steps for line in step.rig.notes[-1:]]
+    return replace(found, notes=(*rig.notes, *kept))
+
+
+def _names(candidate: Candidate) -> list[str]:
+    """Full names of the parameters that adding a candidate sets free."""
+    return [n for n in (candidate.strength, *candidate.forms, candidate.held) if n]
+
+
+def freed(rig: Rig, step: Addition, own: Iterable[str] | None = None) -> Rig:
+    """The rig with its own priors and one more free effect; what was added starts where it is.
+
+    ``own`` are the parameters that may be set: by default all that the fit set free.
+    """
+    ours, fit, unknowns = rig.plant.values, step.fit, step.fit.unknowns
+    values = fit.plant.values
+    free = [n for n, w in zip(unknowns.names, unknowns.precision, strict=True) if w < 1.0]
+    free = [name for name in free if own is None or name in own]
+    found = {name: values[name] for name in (*free, *unknowns.held) if name in ours}
+    plant = rig.plant.with_values(found)
+    if is_new(rig, step.candidate):
+        return replace(rig, plant=plant, added=(*rig.added, step.candidate.name))
+    known = dict(zip(unknowns.names, posterior_deviation(fit).tolist(), strict=True))
+    loosened = {**rig.deviations, **{name: known[name] for name in free}}
+    return replace(rig, plant=plant, deviations=loosened)
+
+
+def is_new(rig: Rig, candidate: Candidate) -> bool:
+    """True for a cause that is absent from the rig's plant, not a shift of what it has."""
+    known = rig.plant.parameters[candidate.strength]
+    absent = rig.plant.values.get(candidate.strength, known.null) == known.null
+    return candidate.held is None and absent
+
+
+def addition(
+    rig: Rig,
+    before: Errors,
+    candidate: Candidate,
+    fit: Fit,
+    held_out: Fit | None,
+    drops: tuple[float, float],
+) -> Addition:
+    """A fit with one more effect as an addition to the rig that it was fitted for."""
+    share, unseen = drops
+    found = fitted_rig(rig, fit, [candidate.name] if is_new(rig, candidate) else [])
+    kind = ""
+    if is_law(candidate.name):
+        kind = f"empirical, not a physical effect, seen for {ranges_text(found.seen)}; "
+    falls = f"error {share:.0%} smaller in training, {unseen:.0%} in validation"
+    return Addition(
+        rig=replace(found, notes=(*rig.notes, f"{candidate.name}: {kind}{falls}")),
+        candidate=candidate,
+        before=before,
+        after=errors_of(fit, held_out),
+        drop_train=share,
+        drop_validation=unseen,
+        parameters=moved_parameters(fit),
+        fit=fit,
+        validation_fit=held_out,
+    )
+
+
+def moved_parameters(fit: Fit) -> tuple[Moved, ...]:
+    """What a fit moved, with standard deviations."""
+    values, unknowns = fit.plant.values, fit.unknowns
+    deviation = posterior_deviation(fit)
+    return tuple(
+        Moved(name, float(prior), values[name], float(d), float(s) if w >= 1.0 else float("inf"))
+        for name, prior, s, w, d in zip(
+            unknowns.names,
+            unknowns.prior,
+            unknowns.scale,
+            unknowns.precision,
+            deviation,
+            strict=True,
+        )
+    )

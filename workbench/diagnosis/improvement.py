@@ -1,0 +1,87 @@
+"""What an improvement gives: frozen values that the command line prints and the report draws."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import NamedTuple
+
+from workbench.diagnosis.addition import Addition, Moved
+from workbench.diagnosis.passes import Removal, Swap
+from workbench.diagnosis.result import Diagnosis, Law
+from workbench.fitting.errors import Errors
+from workbench.fitting.gauss_newton import Fit
+from workbench.rig import Rig
+
+
+class Change(Enum):
+    """What a step of an improvement did."""
+
+    START = "as it came"
+    ADDED = "added"
+    DROPPED = "dropped"
+    SWAPPED = "swapped"
+    LAW = "empirical"
+
+
+class Stage(NamedTuple):
+    """One bar of the budget: weighted squared error per sample on both sets after a step."""
+
+    label: str
+    train: float
+    validation: float
+    change: Change = Change.ADDED
+
+
+@dataclass(frozen=True)
+class Improvement:
+    """Rounds of diagnosis and addition, second thoughts, and the rig that they end with.
+
+    Attributes
+    ----------
+    steps
+        What the rounds added, in order, the terms of a law at the end; also what was dropped later.
+    diagnoses
+        One for each round; the last one accepted nothing, unless the user stopped it.
+    removals, swaps
+        What the backward and the swap pass found, in order.
+    law
+        The empirical law that was taken, None without.
+    before, after
+        Errors over windows with free starts on both sets, as the rig came and in the end.
+    free_before, free_after
+        The same over free runs; empty for a plant without states.  Where positions integrate they
+        are no judge: the right effect can make them worse until the next one is there.
+    parameters
+        Before and after with standard deviations, of all that the final fit moved.
+    budget
+        Errors per sample from the bare rig to the final one, step by step.
+    stopped
+        True where the user stopped it after at least one finished round.
+    fit, validation_fit
+        The final fits; those of the first prior fit where nothing was accepted.
+    """
+
+    rig: Rig
+    steps: tuple[Addition, ...]
+    diagnoses: tuple[Diagnosis, ...]
+    removals: tuple[Removal, ...]
+    swaps: tuple[Swap, ...]
+    law: Law | None
+    before: Errors
+    after: Errors
+    free_before: Errors
+    free_after: Errors
+    parameters: tuple[Moved, ...]
+    budget: tuple[Stage, ...]
+    stopped: bool
+    fit: Fit = field(repr=False)
+    validation_fit: Fit | None = field(repr=False)
+
+    @property
+    def kept(self) -> tuple[str, ...]:
+        """Public names, with places, of what the final rig has more than the first."""
+        names = [step.candidate.name for step in self.steps]
+        gone = [each.candidate.name for each in self.removals if each.dropped]
+        swapped = {s.candidate.name: s.rival.name for s in self.swaps if s.replaced}
+        return tuple(swapped.get(name, name) for name in names if name not in gone)

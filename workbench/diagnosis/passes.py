@@ -1,0 +1,233 @@
+"""Second thoughts on what was accepted: is each effect still needed, and is it the right one.
+
+Forward selection judges an effect against the model of its round.  What came later may have made it
+needless, or may have turned the scales for a rival.  So in the end each is taken out once, all else
+is fitted again, and it is put back: the criteria of its round must hold again (backward pass).  At
+the same place its rivals are tried, and one that is clearly better in training and held out takes
+its place (swap pass).
+
+Source: diagnosis.md 1.10.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from math import nan
+
+from workbench.diagnosis.addition import Addition, addition, assembled
+from workbench.diagnosis.diagnose import Progress
+from workbench.diagnosis.judge import CLEARLY_LESS, reasons_against
+from workbench.diagnosis.refit import Refit, refit, refit_from, refit_shift
+from workbench.diagnosis.result import Diagnosis, Ranked
+from workbench.diagnosis.rough import rough_fit
+from workbench.diagnosis.scan import scan
+from workbench.diagnosis.shifts import shifts
+from workbench.effect import Kind
+from workbench.fitting.errors import errors_of
+from workbench.fitting.gauss_newton import Fit
+from workbench.fitting.problem import Problem, improved_base, pose
+from workbench.plant import Candidate
+from workbench.recording import Recording
+from workbench.rig import Rig
+
+LEAST_LEFT = 0.01  # share of a misfit: below it two shares are as good as equal
+MOST_RIVALS = 2
+
+
+@dataclass(frozen=True)
+class Removal:
+    """One accepted effect taken out of the final model and put back.
+
+    share_train, share_validation
+        Of the misfit of the fitted model without it: what it removes.
+    reasons
+        The criteria that it fails there; empty where it earns its place.
+    dropped
+        True where it was left out.
+    """
+
+    candidate: Candidate
+    share_train: float
+    share_validation: float
+    reasons: tuple[str, ...]
+    dropped: bool
+
+
+@dataclass(frozen=True)
+class Swap:
+    """One accepted effect against a rival in its place, each share of the misfit without both.
+
+    ``replaced`` is True where the rival took the place.
+    """
+
+    candidate: Candidate
+    rival: Candidate
+    share_train: float
+    share_validation: float
+    rival_train: float
+    rival_validation: float
+    replaced: bool
+
+
+@dataclass(frozen=True)
+class Kept:
+    """The accepted effects as they stand: their additions, and the fit of all of them."""
+
+    steps: tuple[Addition, ...]
+    fit: Fit = field(repr=False)
+    validation: Fit | None = field(repr=False)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Public names with their places."""
+        return tuple(step.candidate.name for step in self.steps)
+
+    def judged(self, step: Addition) -> bool:
+        """True for what was accepted last: the model of its round is the final one without it."""
+        return step is self.steps[-1] and step.fit is self.fit
+
+    def without(self, step: Addition) -> tuple[Addition, ...]:
+        """All steps but one."""
+        return tuple(each for each in self.steps if each is not step)
+
+
+@dataclass(frozen=True)
+class _Opened:
+    """The final model without one effect, fitted, and the refit with it."""
+
+    problem: Problem
+    found: Refit
+
+
+@dataclass(frozen=True)
+class Passes:
+    """Backward and swap pass over a rig: its recordings, and the diagnosis of each acceptance.
+
+    ``diagnoses`` go by the public name of what was accepted.
+    """
+
+    rig: Rig
+    train: Sequence[Recording]
+    validation: Sequence[Recording]
+    diagnoses: Mapping[str, Diagnosis]
+    progress: Progress
+    opened: dict[tuple[str, ...], _Opened] = field(default_factory=dict, repr=False)
+
+    def removal(self, kept: Kept, step: Addition) -> tuple[Removal, Kept]:
+        """Take one effect out: whether it earns its place, and what is kept after that."""
+        candidate, rest = step.candidate, kept.without(step)
+        if needy := self._needing(rest):
+            return Removal(candidate, nan, nan, (f"{needy} needs it",), False), kept
+        if kept.judged(step):
+            return Removal(candidate, step.drop_train, step.drop_validation, (), False), kept
+        at = self._open(kept, step)
+        base, found = at.problem.base, at.found
+        against = reasons_against(base, found)
+        removal = Removal(
+            candidate, found.drop_train, found.drop_validation, against, bool(against)
+        )
+        return removal, Kept(rest, base, at.problem.base_validation) if against else kept
+
+    def swaps(self, kept: Kept, step: Addition) -> tuple[list[Swap], Kept]:
+        """Try the rivals of one effect in its place; the first that is clearly better takes it."""
+        tried: list[Swap] = []
+        for row in self._rivals(kept, step):
+            if kept.judged(step):
+                own = (step.drop_train, step.drop_validation)
+                rival = (row.drop_train, row.drop_validation)
+                tried.append(Swap(step.candidate, row.candidate, *own, *rival, False))
+                continue
+            at = self._open(kept, step)
+            self.progress(f"{row.candidate.name} in place of {step.candidate.name}")
+            found = _refitted(at.problem, row.candidate)
+            if found is None:
+                continue
+            better = clearly_better(at.problem.base, found, at.found)
+            own = (at.found.drop_train, at.found.drop_validation)
+            rival = (found.drop_train, found.drop_validation)
+            tried.append(Swap(step.candidate, row.candidate, *own, *rival, better))
+            if better:
+                return tried, self._with(kept.without(step), at.problem, found)
+        return tried, kept
+
+    def _needing(self, rest: Sequence[Addition]) -> str:
+        """The name of a kept effect that means nothing without the one left out, if there is."""
+        bare = assembled(self.rig, rest).plant
+        return next((s.candidate.name for s in rest if not bare.ready_for(s.candidate)), "")
+
+    def _open(self, kept: Kept, step: Addition) -> _Opened:
+        """The final model without one effect; two passes may ask for it."""
+        key = (step.candidate.name, *kept.names)
+        if key not in self.opened:
+            self.progress(f"without {step.candidate.name}")
+            bare = assembled(self.rig, kept.without(step))
+            problem = pose(bare, self.train, self.validation)
+            found = _put_back(problem, step.candidate, kept.fit)
+            if better := improved_base(problem, [found.fit]):
+                problem, found = better, _put_back(better, step.candidate, kept.fit)
+            self.opened[key] = _Opened(problem, found)
+        return self.opened[key]
+
+    def _rivals(self, kept: Kept, step: Addition) -> list[Ranked]:
+        """Those tied with an effect in its round, else the best runner-up that was followed.
+
+        A shift of a parameter is no rival of an effect: it may well imitate it.
+        """
+        found = self.diagnoses.get(step.candidate.name)
+        if found is None:
+            return []
+        own = next(r for r in found.ranking if r.candidate.name == step.candidate.name)
+        others = [
+            row
+            for row in found.ranking
+            if row.fit is not None and row.candidate.name not in kept.names
+            and row.kind in (Kind.EFFECT, own.kind)
+        ]  # fmt: skip
+        tied = [row for row in others if row.candidate.name in own.tied_with]
+        return tied[:MOST_RIVALS] or others[:1]
+
+    def _with(self, rest: tuple[Addition, ...], problem: Problem, found: Refit) -> Kept:
+        """What is kept with a rival in the place of an effect."""
+        before = errors_of(problem.base, problem.base_validation)
+        drops = (found.drop_train, found.drop_validation)
+        added = addition(
+            assembled(self.rig, rest), before, found.candidate, found.fit, found.validation, drops
+        )
+        return Kept((*rest, added), found.fit, found.validation)
+
+
+def clearly_better(base: Fit, one: Refit, other: Refit) -> bool:
+    """True where one passes every criterion and leaves a fifth less misfit, held out too."""
+
+    def less(a: float, b: float) -> bool:
+        return max(1.0 - a, LEAST_LEFT) < (1.0 - CLEARLY_LESS) * max(1.0 - b, LEAST_LEFT)
+
+    ahead = less(one.drop_train, other.drop_train)
+    ahead = ahead and less(one.drop_validation, other.drop_validation)
+    return ahead and not reasons_against(base, one)
+
+
+def _put_back(problem: Problem, candidate: Candidate, final: Fit) -> Refit:
+    """An effect again in the model without it, from where the final fit has it."""
+    return _shifted(problem, candidate) or refit_from(problem, candidate, final.plant.values)
+
+
+def _refitted(problem: Problem, candidate: Candidate) -> Refit | None:
+    """A rival in the place of an effect, from the scan's best sizes; None where it has none."""
+    base = problem.base
+    names = problem.whole.candidates
+    if candidate.name not in names or not problem.whole.ready_for(candidate):
+        return None
+    if candidate.held in base.unknowns.names:
+        return _shifted(problem, candidate)
+    profiles = scan(
+        problem.whole, base.windows, base.unknowns, base.point, [candidate], base.derivatives
+    )
+    return refit(problem, rough_fit(problem, profiles[0])) if profiles else None
+
+
+def _shifted(problem: Problem, candidate: Candidate) -> Refit | None:
+    """A fitted parameter without its prior; None where the cause is no shift of one."""
+    moved = [each for each in shifts(problem) if each.candidate.name == candidate.name]
+    return refit_shift(problem, moved[0]) if moved else None

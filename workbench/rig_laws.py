@@ -1,0 +1,120 @@
+"""Empirical laws in a rig: their terms in the plant, and the range in which they were seen.
+
+A term stands in ``[effects] add`` beside the effects, ``"law[v|v|]@slide"``, with its coefficient
+in ``[values]``.  The table ``[seen]`` holds the range of each quantity in the recordings that the
+law was fitted to: outside of it nobody knows what it is worth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+from workbench.effect import Effect
+from workbench.effects.empirical import (
+    FORCES,
+    ConstantFlow,
+    EmpiricalFlow,
+    EmpiricalForce,
+    PressureFlow,
+    SpeedFlow,
+)
+from workbench.gas_volume import GasVolume
+from workbench.linkage import JointRod
+from workbench.parts import Body, HeldRod, Supply
+from workbench.plant import Plant
+from workbench.rig_text import RigText, quoted
+from workbench.units import UnitError, public_name, quantity, written
+
+PREFIX = "law["
+Ranges = Mapping[str, tuple[float, float]]
+
+
+def is_law(name: str) -> bool:
+    """True for the name of an empirical term, with or without its place."""
+    return name.startswith(PREFIX)
+
+
+def laws_of(plant: Plant) -> tuple[EmpiricalForce | EmpiricalFlow, ...]:
+    """The empirical terms that stand in a plant."""
+    return tuple(e for e in plant.effects if isinstance(e, EmpiricalForce | EmpiricalFlow))
+
+
+def law_terms(plant: Plant) -> dict[str, Effect]:
+    """Every empirical term that a plant has a place for, absent, by its name with place."""
+    return {term.name: term for term in _terms(plant)}
+
+
+def _terms(plant: Plant) -> Iterator[Effect]:
+    supplied = any(isinstance(part, Supply) for part in plant.parts)
+    for part in plant.parts:
+        if isinstance(part, Body | HeldRod | JointRod):
+            yield from (kind(name=_named(kind, part.name), body=part.name) for kind in FORCES)
+        elif isinstance(part, GasVolume):
+            at = {"chamber": part.name}
+            yield ConstantFlow(name=_named(ConstantFlow, part.name), **at)
+            if supplied:
+                yield PressureFlow(name=_named(PressureFlow, part.name), **at)
+            if body := getattr(part, "body", None):
+                yield SpeedFlow(name=_named(SpeedFlow, part.name), **at, body=body)
+
+
+def _named(kind: type[Effect], place: str) -> str:
+    return f"{kind.causes[0].name}@{place}"
+
+
+def with_laws(plant: Plant, names: Iterable[str]) -> Plant:
+    """The plant with these empirical terms, absent where they are new; other names are left."""
+    there, known = {effect.name for effect in plant.effects}, law_terms(plant)
+    wanted = [known[name] for name in names if name in known and name not in there]
+    return plant.with_effects(*wanted) if wanted else plant
+
+
+def quantities(plant: Plant) -> dict[str, str]:
+    """Full names of what may have a range, by public name: outputs, inputs and states."""
+    inputs = (signal.name for signal in (*plant.measured_inputs, *plant.optional_inputs))
+    names = (*plant.measured, *plant.optional_outputs, *inputs, *plant.state_list)
+    return {public_name(name): name for name in names}
+
+
+def read_seen(text: RigText, plant: Plant) -> dict[str, tuple[float, float]]:
+    """The ranges of a rig file in SI by full name; complaints go to ``text``."""
+    known, found = quantities(plant), {}
+    section = text.flat("seen")
+    if section and not laws_of(plant):
+        text.wrong(("seen",), "is the range of an empirical law, and [effects] adds none")
+    for key, typed in section.items():
+        if key not in known:
+            text.unknown(("seen", key), plant.name, known)
+        elif ends := _ends(text, key, known[key], typed):
+            found[known[key]] = ends
+    return found
+
+
+def _ends(text: RigText, key: str, full: str, typed: Any) -> tuple[float, float] | None:
+    place = ("seen", key)
+    if not (isinstance(typed, list) and len(typed) == 2):
+        text.wrong(place, f"{typed!r} is no range", expected="a list of two, the lower end first")
+        return None
+    try:
+        low, high = (quantity(end, full) for end in typed)
+    except UnitError as error:
+        text.wrong(place, str(error))
+        return None
+    if low > high:
+        text.wrong(place, f"begins above its end, {typed[0]} to {typed[1]}")
+        return None
+    return low, high
+
+
+def seen_lines(seen: Ranges) -> list[str]:
+    """The table ``[seen]`` as a rig file holds it; nothing where there is no range."""
+    if not seen:
+        return []
+    lines = ["", "# where the empirical terms were seen: beyond, nobody knows what they are worth"]
+    rows = (
+        f"{quoted(public_name(name))} = "
+        f"[{quoted(written(low, name))}, {quoted(written(high, name))}]"
+        for name, (low, high) in seen.items()
+    )
+    return [*lines, "[seen]", *rows]
