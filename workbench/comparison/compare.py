@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from workbench.comparison.regimes import regimes, shares
+from workbench.consistency import examined
 from workbench.filtering import filter_pass, recording_filter
 from workbench.fitting.errors import SignalError
 from workbench.fitting.noise import measured_noise
@@ -69,7 +70,7 @@ class RecordingComparison:
     measured, simulated
         Recorded outputs (n,) by full name, and what each horizon gives, NaN where nothing.
     notes
-        What could not be done, in words.
+        What could not be done, and what of the recording does not fit the rig, in words.
     """
 
     name: str
@@ -120,7 +121,7 @@ def _compared(rig: Rig, recording: Recording) -> RecordingComparison:
         worst=_worst(squared, recording.sample_time_s),
         measured=measured,
         simulated=simulated,
-        notes=tuple(notes),
+        notes=(*notes, *map(str, examined(rig, recording))),
     )
 
 

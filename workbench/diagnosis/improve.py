@@ -12,6 +12,7 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
+from workbench.consistency import checked
 from workbench.diagnosis.diagnose import WEAK_EVIDENCE, Progress, diagnose, silent
 from workbench.diagnosis.refit import refit
 from workbench.diagnosis.result import Diagnosis
@@ -88,6 +89,7 @@ def add(
     """
     plant = rig.fit_for(train[0])
     require([name], plant.candidates, plant.name)
+    train, validation = checked(rig, train, validation)
     if not validation:
         warnings.warn(WEAK_EVIDENCE, stacklevel=2)
         train, validation = split(train)

@@ -22,6 +22,7 @@ class Verdict(Enum):
     TIE = "tie"
     NOTHING_MISSING = "nothing_missing"
     NOT_IN_CATALOGUE = "not_in_catalogue"
+    RECORDING_TOO_WEAK = "recording_too_weak"
 
 
 NAMING = (Verdict.FOUND, Verdict.TIE, Verdict.SMALL_PROXY)
