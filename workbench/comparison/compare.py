@@ -29,6 +29,7 @@ from workbench.comparison.maps import ErrorMap, command_maps, motion_maps
 from workbench.comparison.noise import Noise, recorded_noise
 from workbench.comparison.regimes import regimes_of, shares
 from workbench.comparison.residuals import Residual, residual_of
+from workbench.consistency import examined
 from workbench.fitting.errors import SignalError
 from workbench.fitting.windows import WINDOW_S
 from workbench.law_range import warn_beyond
@@ -81,7 +82,7 @@ class RecordingComparison:
     shifts
         Gear shifts with the deviation measure of paper 003; none where there are no gears.
     notes
-        What could not be done, in words.
+        What could not be done, and what of the recording does not fit the rig, in words.
     """
 
     name: str
@@ -149,7 +150,12 @@ def _compared(rig: Rig, recording: Recording) -> RecordingComparison:
         over_motion=motion_maps(course, errors),
         over_command=command_maps(course, errors),
         shifts=shifts,
-        notes=(*notes, *more, *filter(None, (each.sentence for each in noise.values()))),
+        notes=(
+            *notes,
+            *more,
+            *filter(None, (each.sentence for each in noise.values())),
+            *map(str, examined(rig, recording)),
+        ),
     )
 
 

@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
+from workbench.consistency import checked
 from workbench.diagnosis.diagnose import WEAK_EVIDENCE, Progress, silent
 from workbench.diagnosis.law import empirical_law, plant_with_terms
 from workbench.diagnosis.refit import refit
@@ -71,7 +72,7 @@ def add(
         If the effect is there already, only a shift of a parameter that is fitted anyway, fixed by
         the rig, or a change of something that the plant lacks.
     """
-    train, validation = _with_held_out(train, validation)
+    train, validation = _with_held_out(rig, train, validation)
     if is_law(name):
         rig = replace(rig, plant=plant_with_terms(rig.plant, train, [name]))
     plant = rig.fit_for(train[0])
@@ -107,7 +108,7 @@ def add_law(
     ValueError
         If none passes the criteria that an effect must pass.
     """
-    train, validation = _with_held_out(train, validation)
+    train, validation = _with_held_out(rig, train, validation)
     progress("prior fit")
     problem = pose(rig, train, validation)
     progress("empirical law")
@@ -118,9 +119,10 @@ def add_law(
 
 
 def _with_held_out(
-    train: Sequence[Recording], validation: Sequence[Recording]
+    rig: Rig, train: Sequence[Recording], validation: Sequence[Recording]
 ) -> tuple[Sequence[Recording], Sequence[Recording]]:
     """Recordings to train on and to hold out; a third of the first where there are no others."""
+    train, validation = checked(rig, train, validation)
     if validation:
         return train, validation
     warnings.warn(WEAK_EVIDENCE, stacklevel=3)

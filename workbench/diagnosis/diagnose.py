@@ -13,6 +13,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from workbench.comparison.regimes import regime_shares
+from workbench.consistency import trusted
+from workbench.diagnosis.credible import credible
 from workbench.diagnosis.judge import (
     CLEARLY_LESS,
     LEAST_TRAINING,
@@ -67,21 +69,27 @@ def diagnose(
     """Which effect of the catalogue is missing, judged on held-out recordings.
 
     Without ``validation`` the last third of each recording is held out, and the verdict is at most
-    a tie, with a warning; so it is where a recording stands in both.  ``most_windows`` bounds the
-    windows that are fitted: fewer are faster.
+    a tie, with a warning; so it is where a recording stands in both, or one is doubtful (see
+    :mod:`workbench.consistency`).  ``most_windows`` bounds the windows that are fitted: fewer are
+    faster.
 
     Raises
     ------
+    InputError
+        If a recording contradicts the rig so plainly that nothing can be concluded from it.
     ValueError
         If the recordings are too short for a window or show no noise.
     """
-    warnings: tuple[str, ...] = ()
+    progress("the recordings against the rig")
+    (train, validation), doubts = trusted(rig, train, validation)
+    warnings = tuple(map(str, doubts))
     held_out = bool(validation)
     if not held_out:
         train, validation = split(train)
-        warnings = (WEAK_EVIDENCE,)
+        warnings += (WEAK_EVIDENCE,)
     elif any(same_data(one, other) for one in train for other in validation):
-        held_out, warnings = False, (NO_EVIDENCE,)
+        held_out = False
+        warnings += (NO_EVIDENCE,)
     progress("prior fit")
     problem = pose(rig, train, validation, most_windows)
     if not problem.base.converged:
@@ -105,19 +113,22 @@ def diagnose(
         warnings += (f"the refit with {best.candidate.name} did not converge: its size may be off",)
     after = (law.fit, law.validation) if law else (best and best.fit, best and best.validation)
     warnings += unexplained(far, verdict)
-    return Diagnosis(
-        rig_name=rig.name,
-        verdict=verdict,
-        sentence=sentence(verdict, ranking, law),
-        ranking=ranking,
-        where=where,
-        before=errors_of(problem.base, problem.base_validation),
-        after=errors_of(*after) if after[0] else {},
-        law=law,
-        warnings=warnings,
-        base=problem.base,
-        base_validation=problem.base_validation,
-        next_recording=recommended(verdict, ranking, problem.base, progress),
+    return credible(
+        Diagnosis(
+            rig_name=rig.name,
+            verdict=verdict,
+            sentence=sentence(verdict, ranking, law),
+            ranking=ranking,
+            where=where,
+            before=errors_of(problem.base, problem.base_validation),
+            after=errors_of(*after) if after[0] else {},
+            law=law,
+            warnings=warnings,
+            base=problem.base,
+            base_validation=problem.base_validation,
+            next_recording=recommended(verdict, ranking, problem.base, progress),
+        ),
+        doubts,
     )
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from workbench.consistency import checked
 from workbench.fitting.errors import Errors, errors_of
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.posterior import fitted_rig, posterior_covariance
@@ -84,6 +85,7 @@ def fit(
     if not free:
         names = ", ".join(only) or "the plant"
         raise ValueError(f"nothing to fit: {names} is fixed or has no uncertainty in {rig.name}")
+    train, validation = checked(rig, train, validation)
     progress("fit")
     problem = pose(held, train, validation)
     before = _untouched(problem)

@@ -36,6 +36,22 @@ RESUMED_MASS_SHARE = 0.05  # the same where it was lost from sight: 15 K, in ful
 
 def guessed_states(plant: Plant, recording: Recording) -> np.ndarray:
     """States at every sample and their standard deviations from the recording, (2, n_x, n)."""
+    blind = long_holes(plant, recording)
+    states = sensed_states(plant, recording, blind)
+    if not states.size:
+        return states
+    weighed = [p for p in plant.parts if isinstance(p, GasVolume) and p.level.counts_mass]
+    for part in weighed:
+        if f"{part.name}.pressure_pa" in recording.channels:
+            _follow_gas(plant, part, recording, states, blind)
+    return states
+
+
+def sensed_states(plant: Plant, recording: Recording, blind: np.ndarray) -> np.ndarray:
+    """The same with gas at the temperature of its wall: in no time, and 15 K off in full motion.
+
+    ``blind`` tells the samples, (n,), at which nothing is known.
+    """
     n, starts = len(recording), recording.starts
     seen = {name: bridged(values, starts) for name, values in recording.channels.items()}
     for name in list(seen):
@@ -43,7 +59,6 @@ def guessed_states(plant: Plant, recording: Recording) -> np.ndarray:
         if speed != name and speed not in seen:
             seen[speed] = slope(seen[name], recording.sample_time_s, starts)
     seen["time_s"] = recording.time_s
-    blind = long_holes(plant, recording)
     rows = []
     for member in plant.members:
         guesses = member.guess(seen)
@@ -52,14 +67,7 @@ def guessed_states(plant: Plant, recording: Recording) -> np.ndarray:
             values = np.broadcast_to(np.asarray(value, dtype=float), (n,))
             values = np.where(np.isfinite(values), values, float(state.initial))
             rows.append(np.stack([values, np.where(blind, state.scale, deviation)]))
-    if not rows:
-        return np.zeros((2, 0, n))
-    states = np.stack(rows, axis=1)
-    weighed = [p for p in plant.parts if isinstance(p, GasVolume) and p.level.counts_mass]
-    for part in weighed:
-        if f"{part.name}.pressure_pa" in seen:
-            _follow_gas(plant, part, recording, states, blind)
-    return states
+    return np.stack(rows, axis=1) if rows else np.zeros((2, 0, n))
 
 
 def bridged(values: np.ndarray, starts: tuple[int, ...]) -> np.ndarray:

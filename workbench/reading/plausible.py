@@ -77,19 +77,31 @@ def warn_of_sensors(channels: Mapping[str, np.ndarray], outputs: set[str], file:
     """Warn of sensors that stand still, or sit at the end of their range, for a while."""
     for name in outputs & channels.keys():
         values = channels[name]
-        same = np.diff(values) == 0
-        length, first = _longest_run(same)
-        rest = np.delete(same, slice(first, first + length)) if length else same
-        if length < RUN or not len(rest) or rest.mean() > LIVELY:
+        stretch = stuck_stretch(values)
+        if stretch is None:
             continue
+        first, length = stretch
         at_end = values[first] in (np.nanmin(values), np.nanmax(values))
         shown = scale(display_unit(name), name).from_si(values[first])
         warnings.warn(
             f"{file}: {public_name(name)}: {'saturated' if at_end else 'stuck'} at "
-            f"{shown:.5g} {display_unit(name)} for {length + 1} samples from sample {first + 1} on",
+            f"{shown:.5g} {display_unit(name)} for {length} samples from sample {first + 1} on",
             RecordingWarning,
             stacklevel=3,
         )
+
+
+def stuck_stretch(values: np.ndarray) -> tuple[int, int] | None:
+    """First sample and length of the longest stretch that is equal to the last bit, (n,).
+
+    None where it is short, or where the channel often stands still.
+    """
+    same = np.diff(values) == 0
+    length, first = _longest_run(same)
+    rest = np.delete(same, slice(first, first + length)) if length else same
+    if length < RUN or not len(rest) or rest.mean() > LIVELY:
+        return None
+    return first, length + 1
 
 
 def _longest_run(same: np.ndarray) -> tuple[int, int]:

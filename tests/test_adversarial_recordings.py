@@ -1,0 +1,231 @@
+"""Spoiled recordings: each is told for what it is, and none gets a confident wrong name.
+
+The servo drive's are those of the demo, which the independent truth made; the other plants' come
+from the flat oracles or are real.
+"""
+
+import numpy as np
+import oracle_crr_rig
+import oracle_soft_joint
+import pytest
+from scipy.integrate import solve_ivp
+
+from studies import adversarial as spoil
+from studies.demo import DATA
+from workbench.comparison import compare
+from workbench.consistency import Weight, examined, trusted
+from workbench.diagnosis.diagnose import diagnose
+from workbench.diagnosis.result import Verdict
+from workbench.errors import InputError
+from workbench.fitting.fit import fit
+from workbench.reading import RecordingWarning, read_recording
+from workbench.recording import Recording
+from workbench.recordings import RECORDINGS, real_data_folder
+from workbench.rig import default_rig, load_rig
+
+FOLDER = real_data_folder()
+A, B, PLACE, COMMAND = spoil.A, spoil.B, spoil.PLACE, spoil.COMMAND
+
+
+@pytest.fixture(scope="module")
+def demo():
+    """The demo's rig, and its training and validation recordings."""
+    rig = load_rig(DATA / "rig.toml")
+    return rig, *(read_recording(rig, DATA / f"{k}.csv") for k in ("train", "validation"))
+
+
+def said(rig, recording):
+    return [(each.weight, f"{each.channel} {each.what}") for each in examined(rig, recording)]
+
+
+def test_nothing_is_said_of_good_recordings(demo):
+    rig, *recordings = demo
+
+    assert [said(rig, each) for each in recordings] == [[], []]
+
+
+@pytest.mark.skipif(FOLDER is None, reason="the real recordings are not beside the project")
+@pytest.mark.filterwarnings("ignore::workbench.reading.RecordingWarning")
+@pytest.mark.parametrize("data", RECORDINGS, ids=lambda data: data.__name__.rpartition(".")[2])
+def test_nothing_is_said_of_real_recordings(data):
+    for rig, recording in data.everything(FOLDER):
+        assert said(rig, recording) == [], recording.name
+
+
+MISREAD = {
+    "pressures exchanged": "chamber_a.pressure and chamber_b.pressure look exchanged",
+    "a times 10": "chamber_a.pressure looks ten times too large",
+    "a by 10": "chamber_a.pressure looks ten times too small",
+    "both pressures by 10": "chamber_a.pressure and chamber_b.pressure look ten times too small",
+    "a in bar as Pa": "chamber_a.pressure looks 100 000 times (bar for Pa) too small",
+    "position times 10": "slide.position looks ten times (cm for mm) too large",
+    "position by 10": "slide.position looks ten times (cm for mm) too small",
+    "position in mm as m": "slide.position looks a thousand times (m for mm) too large",
+    "position in m as mm": "slide.position looks a thousand times (m for mm) too small",
+    "command by 10": "valve.command looks ten times too small",
+    "position negative": "slide.position seems to count the other way",
+    "position mirrored": "slide.position seems to count the other way",
+    "command mirrored": "valve.command seems to act the other way",
+    "all noise": "chamber_a.pressure is noise",
+    "a is noise": "chamber_a.pressure is noise",
+}
+
+
+@pytest.mark.parametrize("way", MISREAD)
+def test_a_misread_servo_drive_is_refused_with_what_is_wrong(demo, way):
+    rig, train, _ = demo
+    with pytest.raises(InputError) as error:
+        trusted(rig, [spoil.SERVO_DRIVE[way](train)])
+
+    assert MISREAD[way] in str(error.value).replace(": ", " ")
+
+
+def test_every_spoiled_recording_of_several_is_named(demo):
+    rig, train, validation = demo
+    swap = spoil.SERVO_DRIVE["pressures exchanged"]
+    with pytest.raises(InputError) as error:
+        trusted(rig, [swap(train)], [swap(validation)])
+
+    assert len(error.value.messages) == 2
+    assert "validation.csv" in str(error.value.messages[1])
+
+
+@pytest.mark.parametrize(("name", "public"), [(PLACE, "slide.position"), (A, "chamber_a.pressure")])
+def test_a_stuck_sensor_is_doubtful_and_its_samples_are_left_out(demo, name, public):
+    rig, train, _ = demo
+    ((left,),), findings = trusted(rig, [spoil.stuck(name, 3.0)(train)])
+    (finding,) = findings
+
+    assert finding.weight is Weight.DOUBT
+    assert finding.channel == public and "stuck" in finding.what
+    assert np.isnan(left[name][3000:]).all() and np.isfinite(left[name][:3000]).all()
+    assert np.array_equal(left[B], train[B])
+
+
+def test_an_uneven_clock_is_noticed_with_its_size(demo):
+    rig, train, _ = demo
+    ((weight, text),) = said(rig, spoil.SERVO_DRIVE["clock jitter"](train))
+
+    assert weight is Weight.NOTICE
+    assert 0.1 < float(text.partition("taken ")[2].partition("%")[0]) / 100 < 0.3
+
+
+def test_a_sensor_at_rest_is_no_noise(demo):
+    """A slide that stands still shows nothing but noise, and nothing is wrong with it."""
+    rig, _, _ = demo
+    rng, n = np.random.default_rng(5), 3000
+    rows = {COMMAND: np.full(n, 4.95), PLACE: 0.1 + 3e-5 * rng.standard_normal(n)}
+    rows |= {name: 5.65e5 + 400.0 * rng.standard_normal(n) for name in (A, B)}
+
+    assert said(rig, Recording("rest", 1e-3, rows)) == []
+
+
+def test_a_comparison_goes_on_and_says_it(demo):
+    rig, train, _ = demo
+    (found,) = compare(
+        rig, [spoil.SERVO_DRIVE["pressures exchanged"](train.part(0, 3000))]
+    ).recordings
+
+    assert any("look exchanged" in note for note in found.notes)
+
+
+def test_a_fit_refuses_and_warns(demo):
+    rig, train, _ = demo
+    with pytest.raises(InputError, match="look exchanged"):
+        fit(rig, [spoil.SERVO_DRIVE["pressures exchanged"](train)])
+    with pytest.warns(RecordingWarning, match="stuck"):
+        fit(rig, [spoil.stuck(PLACE, 2.0)(train.part(0, 3000))], only=["slide.mass_kg"])
+
+
+CAP, ROD_SIDE = "cap.pressure_pa", "rod_side.pressure_pa"
+CRR = {
+    "exchanged": (
+        spoil.exchanged(CAP, ROD_SIDE),
+        "cap.pressure and rod_side.pressure look exchanged",
+    ),
+    "bar as Pa": (spoil.scaled(1e-5, CAP), "cap.pressure looks 100 000 times"),
+    "by 10": (spoil.scaled(0.1, ROD_SIDE), "rod_side.pressure looks ten times"),
+    "mirrored": (spoil.turned("valve.command_v", 5.25), "valve.command seems to act the other way"),
+    "position": (spoil.scaled(0.1, "rod.position_m"), "rod.position looks ten times"),
+}
+
+
+@pytest.fixture(scope="module")
+def crr():
+    """Four seconds of the rescue robot's rig by its flat oracle, with noise."""
+    dt, n = 1e-3, 4000
+    time_s = dt * np.arange(n)
+    command = 5.25 + 1.3 * np.sign(np.sin(2 * np.pi * 0.9 * time_s)) * np.sin(5.3 * time_s) ** 2
+    gas = [3e5, 3e5]
+    masses = np.array(gas) * oracle_crr_rig.volumes(0.07) / (oracle_crr_rig.R * 293.15)
+    start = [0.07, 0.0, gas[0], masses[0], gas[1], masses[1]]
+    found = solve_ivp(
+        lambda t, x: oracle_crr_rig.rates(x, command[min(int(t / dt), n - 1)]),
+        (0.0, time_s[-1]), start, "LSODA", time_s, rtol=1e-6, atol=1e-9, max_step=5e-3,
+    )  # fmt: skip
+    rng = np.random.default_rng(3)
+    rows = {"valve.command_v": command}
+    measured = (("rod.position_m", 0, 2e-5), (CAP, 2, 500.0), (ROD_SIDE, 4, 500.0))
+    for name, row, sigma in measured:
+        rows[name] = found.y[row] + sigma * rng.standard_normal(n)
+    return default_rig("crr_rig"), Recording("rig", dt, rows)
+
+
+def test_nothing_is_said_of_the_rescue_robot_s_rig(crr):
+    assert said(*crr) == []
+
+
+@pytest.mark.parametrize("way", CRR)
+def test_a_misread_rescue_robot_s_rig_is_told(crr, way):
+    rig, recording = crr
+    change, expected = CRR[way]
+    ((weight, text),) = said(rig, change(recording))
+
+    assert weight is Weight.REFUSED and expected in text
+
+
+@pytest.fixture(scope="module")
+def joint():
+    """A soft joint filled and vented by its flat oracle, at 400 Hz."""
+    dt, n, finer = 2.5e-3, 2400, 10
+    pwm = np.repeat(np.random.default_rng(8).uniform(0.2, 0.8, n // 120), 120)
+    pressure, rows = 2e5, []
+    for command in pwm:
+        rows.append(pressure)
+        for _ in range(finer):
+            pressure += dt / finer * oracle_soft_joint.rate(pressure, command)
+    noise = 200.0 * np.random.default_rng(9).standard_normal(n)
+    channels = {"valve.pwm": pwm, "bellows.pressure_pa": np.array(rows) + noise}
+    return default_rig("soft_joint"), Recording("joint", dt, channels)
+
+
+JOINT = {
+    "as it is": (lambda r: r, None),
+    "by 10": (spoil.scaled(0.1, "bellows.pressure_pa"), "bellows.pressure looks ten times"),
+    "times 10": (spoil.scaled(10.0, "bellows.pressure_pa"), "bellows.pressure looks ten times"),
+    "mirrored": (spoil.turned("valve.pwm", 0.5), "valve.pwm seems to act the other way"),
+    "gauge": (spoil.shifted(-1.013e5, "bellows.pressure_pa"), "looks one atmosphere too small"),
+    "noise": (spoil.noise("bellows.pressure_pa"), "bellows.pressure is noise"),
+}
+
+
+@pytest.mark.parametrize("way", JOINT)
+def test_a_misread_soft_joint_is_told(joint, way):
+    rig, recording = joint
+    change, expected = JOINT[way]
+    texts = [text for _, text in said(rig, change(recording))]
+
+    assert len(texts) == (expected is not None)
+    assert all(expected in text for text in texts)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("way", ["all slow noise", "another command"])
+def test_what_nothing_explains_gets_no_name(demo, way):
+    rig, *recordings = demo
+    train, validation = (spoil.SERVO_DRIVE[way](each) for each in recordings)
+    found = diagnose(rig, [train], [validation], most_windows=24)
+
+    assert found.verdict is Verdict.RECORDING_TOO_WEAK
+    assert found.named is None
+    assert any("nothing explains the recording" in each for each in found.warnings)

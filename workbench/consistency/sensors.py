@@ -1,0 +1,139 @@
+"""Sensors that say nothing, and clocks that tick unevenly.
+
+Noise      A signal with any motion in it is smoother than white noise: the third differences of
+           white noise have 20 times its variance, those of a motion next to none.
+Stuck      Equal to the last bit for a while, in a channel that otherwise changes from sample to
+           sample, while the plant says that it moves.
+Clock      A sample taken delta late reads y + delta dy/dt: noise that grows with the slope, by the
+           same delta in every channel that is fine enough to show it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from workbench.consistency.explained import MOVING, Probe, predicted_motion
+from workbench.consistency.findings import Finding, Weight
+from workbench.fitting.noise import THIRD_DIFFERENCE_GAIN, measured_noise
+from workbench.fitting.window_cuts import evenly
+from workbench.plant import Plant
+from workbench.reading.plausible import stuck_stretch
+from workbench.recording import Recording
+from workbench.units import display_unit, public_name, scale
+
+WHITE = 0.8  # of a channel's standard deviation is that of white noise
+LEAST_STUCK = 0.02  # of a recording
+LOOKED_AT = 8  # windows of a stretch in which a sensor may be stuck
+UNEVEN = 0.1  # of a sample: a clock that ticks as unevenly as that is worth a word
+STEEPEST = 0.2  # share of the samples at which an uneven clock shows most
+FINE = 0.05  # of a sample: the jitter that a channel must be able to show
+MEDIAN_OF_NORMAL = 0.6745
+
+
+def noisy(plant: Plant, recording: Recording, unexplained: np.ndarray) -> list[Finding]:
+    """Outputs that are nothing but noise, although the plant says they move.
+
+    A sensor at rest is noise too, but then the plant agrees that nothing moves.
+    """
+    found = []
+    for name, share in zip(plant.measured, unexplained, strict=True):
+        white = _white_share(recording, name)
+        if white > WHITE and share > 1.0 and not _small(plant, recording, name):
+            what = f"is noise: {min(white, 1.0):.0%} of it changes at random from sample to sample"
+            remedy = "check the wiring, or leave the channel out of [recording.channels]"
+            found.append(_finding(Weight.REFUSED, recording, name, what, remedy))
+    return found
+
+
+def _small(plant: Plant, recording: Recording, name: str) -> bool:
+    """Whether a channel moves by less than a hundredth of the plant's typical size of it."""
+    states = plant.state_list
+    return name in states and np.nanstd(recording[name]) < 0.01 * states[name].scale
+
+
+def _white_share(recording: Recording, name: str) -> float:
+    """Standard deviation of the white part of a channel over that of the whole."""
+    spread = float(np.nanstd(recording[name]))
+    third = [np.diff(piece[name], 3) for piece in recording.pieces]
+    third_rms = np.sqrt(np.nanmean(np.concatenate(third) ** 2)) if len(third) else 0.0
+    return float(third_rms / np.sqrt(THIRD_DIFFERENCE_GAIN)) / max(spread, 1e-300)
+
+
+def stuck(plant: Plant, recording: Recording) -> tuple[Recording, list[Finding]]:
+    """The recording without the samples of outputs that are stuck, and the findings."""
+    found, channels = [], dict(recording.channels)
+    for name in plant.measured:
+        stretch = stuck_stretch(recording[name])
+        if stretch is None or not _should_move(plant, recording, name, stretch):
+            continue
+        first, length = stretch
+        kept = recording[name].copy()
+        kept[first : first + length] = np.nan
+        channels[name] = kept
+        begin_s, end_s = (recording.sample_time_s * k for k in (first, first + length - 1))
+        shown = scale(display_unit(name), name).from_si(recording[name][first])
+        what = (
+            f"stuck at {shown:.5g} {display_unit(name)} from {begin_s:.4g} to {end_s:.4g} s, while "
+            "the plant says it moves"
+        )
+        remedy = "these samples are left out; check the sensor"
+        found.append(_finding(Weight.DOUBT, recording, name, what, remedy))
+    return replace(recording, channels=channels), found
+
+
+def _should_move(plant: Plant, recording: Recording, name: str, stretch: tuple[int, int]) -> bool:
+    first, length = stretch
+    size = max(round(0.2 / recording.sample_time_s), 20)
+    firsts = range(first, first + length - size + 1, size)
+    if length < LEAST_STUCK * len(recording) or not firsts:
+        return False
+    chosen = tuple(firsts[k] for k in evenly(len(firsts), min(LOOKED_AT, len(firsts))))
+    motion = predicted_motion(plant, recording, Probe(chosen, size))
+    usual = measured_noise([recording], [name])[name]
+    return bool(np.median(motion[plant.measured.index(name)]) > MOVING * usual)
+
+
+def uneven_clock(plant: Plant, recording: Recording) -> list[Finding]:
+    """A word on samples that are not taken when the clock says, as far as channels can show it."""
+    jitters = [_jitter(recording, name) for name in plant.measured]
+    seen = [jitter for jitter, finest in jitters if finest < FINE]
+    if not seen or min(seen) < UNEVEN:
+        return []
+    late_ms = 1e3 * min(seen) * recording.sample_time_s
+    what = (
+        f"has noise that grows with its slope: samples seem taken {min(seen):.0%} of a sample "
+        f"({late_ms:.2g} ms) early or late, as a standard deviation"
+    )
+    names = [n for n, (_, finest) in zip(plant.measured, jitters, strict=True) if finest < FINE]
+    remedy = "log the time at which each sample was taken"
+    return [_finding(Weight.NOTICE, recording, name, what, remedy) for name in names[:1]]
+
+
+def _jitter(recording: Recording, name: str) -> tuple[float, float]:
+    """Standard deviation of the sampling instant in samples, and the finest that would show."""
+    try:
+        noise = measured_noise([recording], [name])[name]
+    except ValueError:
+        return 0.0, np.inf
+    third, slope = [], []
+    for piece in recording.pieces:
+        y = piece[name]
+        third.append(np.diff(y, 3))
+        slope.append(np.abs(y[3:] - y[:-3]) / 3.0)
+    bends, slopes = np.concatenate(third), np.concatenate(slope)
+    seen = np.isfinite(bends)
+    if seen.sum() < 100:
+        return 0.0, np.inf
+    steep = seen & (slopes >= np.quantile(slopes[seen], 1.0 - STEEPEST))
+    typical = float(np.median(slopes[steep]))
+    if typical <= 0.0:
+        return 0.0, np.inf
+    apparent = float(np.median(np.abs(bends[steep]))) / MEDIAN_OF_NORMAL
+    apparent /= np.sqrt(THIRD_DIFFERENCE_GAIN)
+    return np.sqrt(max(apparent**2 - noise**2, 0.0)) / typical, noise / typical
+
+
+def _finding(weight: Weight, recording: Recording, name: str, what: str, remedy: str) -> Finding:
+    return Finding(weight, recording.source or recording.name, public_name(name), what, remedy)
