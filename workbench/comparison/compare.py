@@ -23,7 +23,8 @@ from workbench.fitting.errors import SignalError
 from workbench.fitting.noise import measured_noise
 from workbench.fitting.start_states import refit_starts
 from workbench.fitting.starts import guessed_states
-from workbench.fitting.windows import WINDOW_S, Windows, cut_windows
+from workbench.fitting.window_length import window_length_s
+from workbench.fitting.windows import Windows, cut_windows
 from workbench.plant import Plant
 from workbench.recording import Recording
 from workbench.rig import Rig
@@ -117,7 +118,7 @@ def _compared(rig: Rig, recording: Recording) -> RecordingComparison:
         time_s=recording.time_s,
         errors=errors,
         by_regime=by_regime,
-        worst=_worst(squared, recording.sample_time_s),
+        worst=_worst(squared, recording.sample_time_s, window_length_s(plant, [recording])),
         measured=measured,
         simulated=simulated,
         notes=tuple(notes),
@@ -155,7 +156,8 @@ def _simulated(
         return {PLAIN: _outputs(plant, simulate(plant, recording))}, []
     found, notes = {ONE_STEP: _one_step(plant, recording, noise)}, []
     try:
-        found[WINDOW] = _windows(cut_windows(plant, [recording], noise))
+        length_s = window_length_s(plant, [recording])
+        found[WINDOW] = _windows(cut_windows(plant, [recording], noise, length_s))
     except ValueError as error:
         notes.append(f"no windows: {error}")
     try:
@@ -210,9 +212,9 @@ def _squared(measured: Rows, simulated: Rows) -> np.ndarray:
     return np.where(seen.any(axis=0), weighted.sum(axis=0), np.nan)
 
 
-def _worst(squared: np.ndarray, sample_time_s: float) -> tuple[Span, ...]:
+def _worst(squared: np.ndarray, sample_time_s: float, window_s: float) -> tuple[Span, ...]:
     """The stretches as long as a window with the largest error."""
-    length = max(round(WINDOW_S / sample_time_s), 1)
+    length = max(round(window_s / sample_time_s), 1)
     total = float(np.nansum(squared))
     firsts = range(0, max(len(squared) - length + 1, 1), length)
     sums = [(float(np.nansum(squared[k : k + length])), k) for k in firsts]

@@ -18,6 +18,7 @@ from workbench.diagnosis.judge import (
     SHARE_REASON,
     predicts,
     reasons_against,
+    too_few,
 )
 from workbench.diagnosis.law import empirical_law
 from workbench.diagnosis.ranking import ranked
@@ -46,6 +47,8 @@ CERTAIN_SHARE = 0.5  # an accepted candidate above it needs no comparison with a
 FAR_ABOVE_NOISE = 3.0  # RMSE over noise that is worth a word where nothing is named
 
 WEAK_EVIDENCE = "no validation recording: the last third is held out, which is weak evidence"
+
+FEW_SAMPLES = "few held-out samples are independent of each other, which is weak evidence"
 
 NO_EVIDENCE = "a validation recording is one of the training recordings, which proves nothing"
 
@@ -83,6 +86,8 @@ def diagnose(
         held_out, warnings = False, (NO_EVIDENCE,)
     progress("prior fit")
     problem = pose(rig, train, validation, most_windows)
+    if too_few(problem.base_validation):
+        held_out, warnings = False, (*warnings, FEW_SAMPLES)
     if not problem.base.converged:
         warnings += ("the prior fit did not converge: the ranking is provisional",)
     found = _followed(problem, progress)
