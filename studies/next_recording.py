@@ -54,12 +54,13 @@ def recorded(case: Case, asked: NextRecording) -> Recording:
 
 def separate(case: Case, train: Recording, validation: Recording) -> Separation:
     """Diagnose, record what is asked for, and diagnose again."""
-    before = diagnose(SERVO_DRIVE.user_rig(case), [train], [validation])
+    rig = SERVO_DRIVE.user_rig(case)
+    before = diagnose(rig, [train], [validation])
     asked = before.next_recording
     if asked is None or not asked.predicted:
         return Separation(case, before, None)
     more = recorded(case, asked)
-    return Separation(case, before, diagnose(SERVO_DRIVE.user_rig(case), [train, more], [validation]))
+    return Separation(case, before, diagnose(rig, [train, more], [validation]))
 
 
 def separation_text(found: Separation) -> str:

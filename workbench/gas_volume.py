@@ -17,6 +17,8 @@ from workbench.air import (
     LOWEST_TEMPERATURE_K,
 )
 from workbench.effect import (
+    Balance,
+    BalanceEquation,
     Conditions,
     Expression,
     HeatFlow,
@@ -28,6 +30,21 @@ from workbench.effect import (
 )
 
 LOWEST_MASS_KG = 1e-9
+PRESSURE_RATES = (1e5, 1e6)
+GAS = BalanceEquation(
+    balance=Balance.MASS,
+    kind=MassFlow,
+    term="mass_flow_kg_s",
+    state="pressure_pa",
+    rates=PRESSURE_RATES,
+)
+HEAT = BalanceEquation(
+    balance=Balance.ENERGY,
+    kind=HeatFlow,
+    term="heat_flow_w",
+    state="pressure_pa",
+    rates=PRESSURE_RATES,
+)
 
 
 class ThermalLevel(Protocol):
@@ -125,6 +142,11 @@ class GasVolume(Part):
     level: ThermalLevel = FullLevel()
     initial_pressure_pa: float = 1e5
     initial_temperature_k: float = 293.15
+
+    @property
+    def balances(self) -> tuple[BalanceEquation, ...]:
+        """Gas, and heat where the mass tells the two apart."""
+        return (GAS, HEAT) if self.level.counts_mass else (GAS,)
 
     def initial_volume_m3(self) -> Expression:
         """Gas volume at the start."""

@@ -7,7 +7,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from workbench.effect import Conditions, Expression, Part, Received, State, Torque, form
+from workbench.effect import (
+    BalanceEquation,
+    Conditions,
+    Expression,
+    Part,
+    Received,
+    State,
+    Torque,
+    form,
+)
+from workbench.linkage import TURNING
 from workbench.parts import total
 
 
@@ -25,6 +35,10 @@ class Lever(Part):
     inertia_kg_m2: Expression = form(1e-3, lower=1e-8, relative_deviation=0.05)
     arm_m: Expression = form(0.05, lower=1e-3)
     initial_angle_rad: float = 0.0
+
+    @property
+    def balances(self) -> tuple[BalanceEquation, ...]:
+        return (TURNING,)
 
     def states(self) -> Iterator[State]:
         yield State("angle_rad", self.initial_angle_rad, scale=0.2, tolerance=2e-6)

@@ -16,6 +16,7 @@ import numpy as np
 
 from workbench.effect import (
     Balance,
+    BalanceEquation,
     Cause,
     Conditions,
     Expression,
@@ -30,6 +31,13 @@ from workbench.effect import (
 )
 from workbench.parts import total
 
+TURNING = BalanceEquation(
+    balance=Balance.MOMENTUM,
+    kind=Torque,
+    term="torque_n_m",
+    state="velocity_rad_s",
+    rates=(20.0, 100.0),
+)
 SHORTEST_M = 1e-3  # a cylinder of no length has no direction; geometry never comes near
 
 
@@ -46,6 +54,10 @@ class Joint(Part):
     rod: str
     linkage: str
     initial_angle_rad: float = 0.0
+
+    @property
+    def balances(self) -> tuple[BalanceEquation, ...]:
+        return (TURNING,)
 
     def states(self) -> Iterator[State]:
         yield State("angle_rad", self.initial_angle_rad, scale=1.0, tolerance=5e-7)
@@ -82,6 +94,10 @@ class HeldJoint(Joint):
     """
 
     linkage: str = ""
+
+    @property
+    def balances(self) -> tuple[BalanceEquation, ...]:
+        return ()
 
     def states(self) -> Iterator[State]:
         return iter(())

@@ -12,6 +12,7 @@ import numpy as np
 from workbench.effect import (
     AddedMass,
     Balance,
+    BalanceEquation,
     Cause,
     Conditions,
     Expression,
@@ -82,6 +83,18 @@ class Body(Part):
     initial_position_m: float = 0.0
     travel_m: float = 0.1
     step_error_m: float = 2e-8
+
+    @property
+    def balances(self) -> tuple[BalanceEquation, ...]:
+        return (
+            BalanceEquation(
+                balance=Balance.MOMENTUM,
+                kind=Force,
+                term="force_n",
+                state="velocity_m_s",
+                rates=(1.0, 5.0),
+            ),
+        )
 
     def states(self) -> Iterator[State]:
         yield State("position_m", self.initial_position_m, self.travel_m, self.step_error_m)

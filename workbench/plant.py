@@ -122,11 +122,11 @@ class Plant:
         return replace(self, measured=tuple(names), optional_outputs=rest)
 
     def ready_for(self, candidate: Candidate) -> bool:
-        """False where what the cause needs is itself absent."""
+        """False where what the cause needs is itself absent, or was dropped as such."""
         if not candidate.cause.needs:
             return True
         name = f"{candidate.member}.{candidate.cause.needs}"
-        return self.values[name] != self.parameters[name].null
+        return name in self.values and self.values[name] != self.parameters[name].null
 
     def at_null(self, *candidates: Candidate) -> Plant:
         """The same plant with these causes absent."""

@@ -1,8 +1,9 @@
 """An extended Kalman filter on a plant, one sample as one CasADi function.
 
-Chosen state rates may carry an unknown input, modelled as a random walk:
+Chosen state rates may carry an unknown input, and chosen parameters may wander, both modelled as
+random walks:
 
-    dx/dt = f(x, u, d, p) + E w + process noise,     dw/dt = noise of the given intensity
+    dx/dt = f(x, u, d, p + S w) + E w + process noise,     dw/dt = noise of the given intensity
 
 The transition matrix is not differentiated through the integrator.  It is the stability function
 of Radau IIA of order 3 at a quarter of the step, squared twice: L-stable, so that a bristle at
@@ -54,7 +55,8 @@ class PlantFilter:
     process_noise
         Standard deviation that a state gains per square root of a second; others gain none.
     unknown_inputs
-        Standard deviation that an unknown rate of a state gains per square root of a second.
+        Standard deviation that an unknown rate of a state, or what is added to a parameter, gains
+        per square root of a second.
     initial_deviation
         Standard deviation at the start by state, the plant's scale by default.
     """
@@ -69,7 +71,9 @@ class PlantFilter:
 
     def __post_init__(self) -> None:
         states, who = self.plant.model.states, f"states of {self.plant.name}"
-        for group in (self.process_noise, self.unknown_inputs, self.initial_deviation):
+        wandering = self.plant.model.parameters
+        rates = [name for name in self.unknown_inputs if name not in wandering]
+        for group in (self.process_noise, rates, self.initial_deviation):
             require(group, states, who)
         missing = [n for n in self.plant.measured if self.measurement_noise.get(n, 0.0) <= 0.0]
         if missing:
@@ -118,9 +122,11 @@ class PlantFilter:
         u = ca.MX.sym("u", len(model.commands), self.decimate)
         d = ca.MX.sym("d", len(model.measured_inputs), self.decimate)
         p = ca.MX.sym("p", len(model.parameters))
-        S, E = self.scale, self._entering
+        S = self.scale
         x, w = S[:n] * X[:n], S[n:] * X[n:, 0]
-        A = model.jacobians(x, u[:, 0], d[:, 0], p)[0]
+        now = p + ca.DM(self._wandering) @ w
+        A = model.jacobians(x, u[:, 0], d[:, 0], now)[0]
+        E = self._entering_at(x, u[:, 0], d[:, 0], now)
         A = A * np.outer(1 / plant.scale, plant.scale)
         coupling = E * np.outer(1 / plant.scale, S[n:])
         F = transition(ca.blockcat([[A, coupling], [ca.MX(n_w, n), ca.MX(n_w, n_w)]]), h)
@@ -214,6 +220,24 @@ class PlantFilter:
         ).reshape(len(self.plant.scale), -1)
 
     @property
+    def _wandering(self) -> np.ndarray:
+        """S: which parameter each unknown input is added to, shape (n_p, n_w)."""
+        names = self.plant.model.parameters
+        return np.array(
+            [[float(name == w) for w in self.unknown_inputs] for name in names]
+        ).reshape(len(names), -1)
+
+    @cached_property
+    def _entering_at(self) -> ca.Function:
+        """(x, u, d, p) -> how each state rate answers each unknown input, shape (n_x, n_w)."""
+        model = self.plant.model
+        wandering = [k for k, name in enumerate(model.parameters) if name in self.unknown_inputs]
+        p = model.symbols[3]
+        slopes = ca.jacobian(model.rates, p[wandering]) @ ca.DM(self._wandering[wandering])
+        entering = slopes + ca.DM(self._entering)
+        return ca.Function("entering", [*model.symbols], [ca.densify(entering)])
+
+    @property
     def corrected(self) -> np.ndarray:
         """1 for what a measurement corrects, 0 for bristles, shape (n_x + n_w,)."""
         bristles = [f"{m.name}.deflection_m" for m in self.plant.members if _slides(m)]
@@ -228,7 +252,8 @@ class PlantFilter:
             return model.step(dt)
         x, u, d, p = model.symbols
         w = ca.SX.sym("w", len(self.unknown_inputs))
-        rates = model.rates + ca.DM(self._entering) @ w
+        rates = ca.substitute(model.rates, p, p + ca.DM(self._wandering) @ w)
+        rates += ca.DM(self._entering) @ w
         return controlled_step((x, u, d, ca.vertcat(p, w)), rates, dt, model.tolerances)
 
 

@@ -127,6 +127,14 @@ def suffix(name: str) -> str:
     return ""
 
 
+def _pair(name: str) -> tuple[str, str]:
+    """SI unit and the unit for display; N m of a torque and N/m of a stiffness read alike."""
+    unit = suffix(name)
+    if unit == "n_m" and name.rpartition(".")[2].startswith("torque"):
+        return "N m", "N m"
+    return _UNITS[unit] if unit else ("", "")
+
+
 def public_name(name: str) -> str:
     """A name without its unit: ``slide.position`` for ``slide.position_m``."""
     unit = suffix(name)
@@ -135,12 +143,12 @@ def public_name(name: str) -> str:
 
 def si_unit(name: str) -> str:
     """The SI unit of a quantity by its full name; empty if dimensionless."""
-    return _UNITS[suffix(name)][0] if suffix(name) else ""
+    return _pair(name)[0]
 
 
 def display_unit(name: str) -> str:
     """The unit a person reads this quantity in: bar, mm, N; empty if dimensionless."""
-    return _UNITS[suffix(name)][1] if suffix(name) else ""
+    return _pair(name)[1]
 
 
 def scale(unit: str, name: str, ambient_pa: float = STANDARD_ATMOSPHERE_PA) -> Scale:

@@ -10,6 +10,7 @@ import numpy as np
 
 from workbench.effect import (
     Balance,
+    BalanceEquation,
     Cause,
     Conditions,
     Expression,
@@ -21,7 +22,7 @@ from workbench.effect import (
     form,
     strength,
 )
-from workbench.gas_volume import GasVolume, total
+from workbench.gas_volume import PRESSURE_RATES, GasVolume, total
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,6 +107,18 @@ class LumpedPressure(Part):
     """
 
     initial_pressure_pa: float = 1.013e5
+
+    @property
+    def balances(self) -> tuple[BalanceEquation, ...]:
+        return (
+            BalanceEquation(
+                balance=Balance.MASS,
+                kind=PressureRate,
+                term="pressure_rate_pa_s",
+                state="pressure_pa",
+                rates=PRESSURE_RATES,
+            ),
+        )
 
     def states(self) -> Iterator[State]:
         yield State("pressure_pa", self.initial_pressure_pa, scale=1e5, tolerance=20.0)

@@ -77,7 +77,7 @@ def commanded(
     readings, truths = [], []
     for k, command in enumerate(commands):
         seen = observed(p, state)
-        command_v = _quantised(command, COMMAND_STEP_V)
+        command_v = quantised(command, COMMAND_STEP_V)
         readings.append({**_read(seen, noise[k]), "command_v": command_v})
         truths.append(seen)
         state = advance(prepared, state, command_v)

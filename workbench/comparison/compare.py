@@ -31,7 +31,7 @@ from workbench.comparison.regimes import regimes_of, shares
 from workbench.comparison.residuals import Residual, residual_of
 from workbench.consistency import examined
 from workbench.fitting.errors import SignalError
-from workbench.fitting.windows import WINDOW_S
+from workbench.fitting.window_length import window_length_s
 from workbench.law_range import warn_beyond
 from workbench.recording import Recording
 from workbench.rig import Rig
@@ -139,7 +139,7 @@ def _compared(rig: Rig, recording: Recording) -> RecordingComparison:
             for horizon, rows in simulated.items()
         },
         by_regime=_by_regime(course, squared),
-        worst=_worst(squared, recording.sample_time_s),
+        worst=_worst(squared, recording.sample_time_s, window_length_s(plant, [recording])),
         measured=measured,
         simulated=simulated,
         noise=noise,
@@ -203,9 +203,9 @@ def _squared(errors: Rows) -> np.ndarray:
     return np.where(seen.any(axis=0), weighted.sum(axis=0), np.nan)
 
 
-def _worst(squared: np.ndarray, sample_time_s: float) -> tuple[Span, ...]:
+def _worst(squared: np.ndarray, sample_time_s: float, window_s: float) -> tuple[Span, ...]:
     """The stretches as long as a window with the largest error."""
-    length = max(round(WINDOW_S / sample_time_s), 1)
+    length = max(round(window_s / sample_time_s), 1)
     total = float(np.nansum(squared))
     firsts = range(0, max(len(squared) - length + 1, 1), length)
     sums = [(float(np.nansum(squared[k : k + length])), k) for k in firsts]

@@ -18,6 +18,7 @@ import numpy as np
 from workbench.comparison.course import Course
 from workbench.filtering import filter_pass, recording_filter
 from workbench.fitting.start_states import refit_starts
+from workbench.fitting.window_length import window_length_s
 from workbench.fitting.windows import Windows, cut_windows
 from workbench.plant import Plant
 from workbench.recording import Recording
@@ -38,7 +39,8 @@ def foretold(course: Course, noise: Mapping[str, float]) -> tuple[dict[str, Rows
     found = {ONE_STEP: _one_step(plant, recording, noise)}
     notes = lost(recording, found[ONE_STEP])
     try:
-        found[WINDOW] = _windows(cut_windows(plant, [recording], noise))
+        length_s = window_length_s(plant, [recording])
+        found[WINDOW] = _windows(cut_windows(plant, [recording], noise, length_s))
     except ValueError as error:
         notes.append(f"no windows: {error}")
     try:

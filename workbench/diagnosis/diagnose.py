@@ -21,6 +21,7 @@ from workbench.diagnosis.judge import (
     SHARE_REASON,
     predicts,
     reasons_against,
+    too_few,
 )
 from workbench.diagnosis.law import empirical_law
 from workbench.diagnosis.next_recording import recommended
@@ -49,6 +50,8 @@ LOCATED = 2  # candidates that are followed because they act where the smoother 
 CERTAIN_SHARE = 0.5  # an accepted candidate above it needs no comparison with an empirical law
 
 WEAK_EVIDENCE = "no validation recording: the last third is held out, which is weak evidence"
+
+FEW_SAMPLES = "few held-out samples are independent of each other, which is weak evidence"
 
 NO_EVIDENCE = "a validation recording is one of the training recordings, which proves nothing"
 
@@ -92,6 +95,8 @@ def diagnose(
         warnings += (NO_EVIDENCE,)
     progress("prior fit")
     problem = pose(rig, train, validation, most_windows)
+    if too_few(problem.base_validation):
+        held_out, warnings = False, (*warnings, FEW_SAMPLES)
     if not problem.base.converged:
         warnings += ("the prior fit did not converge: the ranking is provisional",)
     progress("where it fails")

@@ -6,7 +6,8 @@ the criterion.  A candidate is accepted when
 1. the effective-sample BIC falls by more than 4: scales already carry the correlation time, so
    dBIC = dchi2 / s2 - k ln(n_eff) with s2 the misfit per effective sample of the better model,
 2. a held-out recording with frozen parameters is predicted better by more than 2 %, and its plain
-   squared error, in which single windows may count for much, does not grow by more than 2 %,
+   squared error, in which single windows may count for much, does not grow by more than 2 %;
+   where few samples of it are independent, it does not grow by more than chance explains,
 3. at least 20 % of the misfit beyond noise goes away, as the mean over training and held-out
    recordings and with no less than 10 % in training: less may stand for something else,
 4. its size is inside its bounds, more than 3 % of typical, and more than two standard deviations
@@ -15,13 +16,14 @@ the criterion.  A candidate is accepted when
 
 from __future__ import annotations
 
-from math import isnan, log
+from math import isnan, log, sqrt
 
 import numpy as np
 
 from workbench.diagnosis.refit import Refit
 from workbench.diagnosis.scan import Profile
 from workbench.fitting.gauss_newton import Fit
+from workbench.fitting.window_length import moves
 
 LEAST_BIC = 4.0
 LEAST_HELD_OUT = 0.02
@@ -30,6 +32,7 @@ LEAST_SHARE = 0.20
 LEAST_TRAINING = 0.10
 LEAST_SIZE = 0.03
 DISTINCT = 2.0  # posterior standard deviations
+FEWEST_SAMPLES = 30.0  # independent ones, for held-out recordings of what does not move to refuse
 LARGEST_TIE = 3
 SAME_DIRECTION = 0.9  # cosine of two signatures that are one
 CLOSE_DROP = 0.25  # of the leader's drop: within it the order is not to be trusted
@@ -57,11 +60,29 @@ def reasons_against(base: Fit, refit: Refit, parameters: int = 0) -> tuple[str, 
 
 
 def predicts(refit: Refit) -> bool:
-    """True where the held-out recording is predicted better, or there is none."""
+    """True where the held-out recording is predicted better, or there is none.
+
+    A handful of independent samples refuses nothing that chance explains: the misfit of n of them
+    is known to sqrt(2/n).
+    """
     if isnan(refit.drop_validation):
         return True
+    if too_few(refit.validation):
+        chance = sqrt(2.0 / effective_samples(refit.validation))
+        return refit.drop_validation > -chance and refit.plain_validation < 1.0 + chance
     grows = refit.plain_validation > MOST_PLAIN
     return refit.drop_validation > LEAST_HELD_OUT and not grows
+
+
+def too_few(held_out: Fit | None) -> bool:
+    """True where held-out recordings of what does not move hold next to no independent samples.
+
+    So it is with a decay slower than its recording: a sensor that wanders by as much as the
+    pressure falls says a few things in a minute, not six hundred.
+    """
+    if held_out is None or moves(held_out.windows.plant):
+        return False
+    return effective_samples(held_out) < FEWEST_SAMPLES
 
 
 def _share(refit: Refit) -> float:

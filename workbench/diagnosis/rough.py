@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from workbench.diagnosis.blind_starts import blind_starts, settled
 from workbench.diagnosis.scan import Profile, Trial
 from workbench.fitting.gauss_newton import Fit, fit_windows, points_costs
 from workbench.fitting.linearised import Point, borrowed
@@ -46,14 +47,16 @@ def rough_fit(problem: Problem, profile: Profile) -> Rough:
     candidate, base = profile.candidate, problem.base
     windows = windows_for(problem, candidate)
     unknowns = _with_shape(problem, problem.unknowns(windows.plant, candidate), profile)
-    begun = [
-        points_costs(windows, unknowns, points).best
-        for points in _starts(problem, windows, unknowns, profile)
-    ]
+    blind = blind_starts(base.windows.plant, base.derivatives)
+    started = _starts(problem, windows, unknowns, profile)
+    if blind:
+        started = [[settled(windows, unknowns, point) for point in each] for each in started]
+    begun = [points_costs(windows, unknowns, points).best for points in started]
     most = WORTH_TRYING * min(each.cost for each in begun)
     tried = []
     for start in (each.point for each in begun if each.cost <= most):
-        at = borrowed(base.derivatives, (base.windows, base.unknowns), windows, unknowns, start)
+        near = (base.windows, base.unknowns)
+        at = None if blind else borrowed(base.derivatives, near, windows, unknowns, start)
         tried.append(fit_windows(windows, unknowns, start, ITERATIONS, at))
     fit = min(tried, key=lambda each: each.cost)
     return Rough(profile, fit, (base.cost - fit.cost) / problem.misfit)

@@ -26,6 +26,7 @@ from itertools import product
 
 import numpy as np
 
+from workbench.diagnosis.blind_starts import blind_starts, freed
 from workbench.effect import Parameter
 from workbench.fitting.linearised import Linearised, Normal, Point, linearise, normal_equations
 from workbench.fitting.problem import staged
@@ -164,6 +165,7 @@ def scan(
     of_all = total / len(windows)
     point, at = replace(point, starts=point.starts[:, kept]), at.part(kept) if at else None
     metric = metric_at(windows, unknowns, point, at)
+    blind = blind_starts(windows.plant, metric.at)
     values = unknowns.values(point.t)
     groups: dict[tuple[str, ...], list[Candidate]] = {}
     for candidate in candidates:
@@ -179,7 +181,12 @@ def scan(
             for change in sizes_to_try(richer.plant, candidate)
         ]
         plants = [richer.plant.with_values({**values, **change}) for _, change in trials]
-        rows = metric.rows(richer.residuals(plants, starts))
+        residuals = richer.residuals(plants, starts)
+        rows = metric.rows(residuals)
+        if blind:
+            freer = freed(metric.at, windows.plant, richer, plants, starts, residuals)
+            alone = zip(freer, residuals, strict=True)
+            rows = np.array([replace(metric, at=at).rows(r[None])[0] for at, r in alone])
         sizes = [_typical_sizes(known[c.strength], change[c.strength]) for c, change in trials]
         profiles += _profiles(metric, trials, sizes, rows, of_all)
     return sorted(profiles, key=lambda profile: -profile.drop)

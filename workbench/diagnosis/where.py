@@ -1,97 +1,106 @@
-"""Where a model fails: the missing term of each balance, from an unknown-input smoother.
+"""Where a model fails: the missing flow of each balance, from an unknown-input smoother.
 
-A random walk is added to one state rate at a time, at *prior* parameters: a deterministic fit would
+A random walk is added to one balance at a time, at *prior* parameters: a deterministic fit would
 spread a valve or leak error into mass and damping and move the blame (diagnosis.md 4.3).  The gain
 of log-likelihood over the filter without it, at the best of a few intensities, names the balance;
 the smoothed walk, in N or kg/s, against the variables that drive it shows what is missing.
+
+Heat enters a pressure as a flow of gas does, and only the mass tells them apart, which nobody
+measures: the energy balance of a gas is named where it gains clearly more than its mass balance.
 
 Source: diagnosis.md 1.3; Kristensen, Madsen and Jorgensen 2004 (significant diffusion terms).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from workbench.air import HEAT_CAPACITY_RATIO
 from workbench.comparison.regimes import regime_shares
 from workbench.diagnosis.result import Dependence, Where
+from workbench.diagnosis.suspects import (
+    Suspect,
+    pace_of,
+    process_noise,
+    suspects,
+    with_missing_flows,
+)
 from workbench.effect import Balance
 from workbench.filtering import FilterResult, log_likelihoods, recording_filter, smooth
 from workbench.fitting.problem import Problem
-from workbench.linkage import Joint, Link
-from workbench.parts import Body, Chamber
+from workbench.fitting.window_length import moves
+from workbench.fitting.windows import Windows
 from workbench.plant import Candidate, Plant
 from workbench.plant_filter import PlantFilter
 from workbench.recording import Recording
 
-GRID_S = 5e-3
+GRID_S = 5e-3  # of the filter where something moves
+STEPS = 40  # of the filter in a window where nothing does
+CLEARLY_MORE = 1.05  # times the gain of the mass balance
 BINS = 15
-INTENSITIES = {  # of a rate, per sqrt(s)
-    "velocity_m_s": (1.0, 5.0),
-    "velocity_rad_s": (20.0, 100.0),
-    "pressure_pa": (1e5, 1e6),
-}
 INTO_GAS = (Balance.VALVE, Balance.FLOW, Balance.MASS, Balance.ENERGY, Balance.SUPPLY)
-PROCESS = {  # what no model is without
-    "velocity_m_s": 0.3,
-    "velocity_rad_s": 6.0,
-    "pressure_pa": 3e4,
-    "mass_kg": 1e-6,
-}
-
-
-@dataclass(frozen=True)
-class Suspect:
-    """A balance whose rate may lack a term."""
-
-    balance: str
-    state: str
-    term_name: str
-    factor: float
 
 
 def locate(problem: Problem, recordings: Sequence[Recording]) -> Where | None:
-    """Log-likelihood gain of each balance, and the missing term of the one that gains most.
+    """Log-likelihood gain of each balance, and the missing flow of the one that gains most.
 
     None for a plant without states, or where no filter run stayed finite.
     """
-    plant = problem.whole.lean()
-    suspects = _suspects(plant)
-    if not suspects:
+    plant, flows = with_missing_flows(problem.whole.lean())
+    windows, recording = problem.base.windows, recordings[0]
+    pace = pace_of(windows, plant)
+    suspected = suspects(plant, flows, recording, pace) if flows else []
+    if not suspected:
         return None
-    recording = recordings[0]
-    noise = dict(zip(plant.measured, problem.base.windows.noise, strict=True))
-    decimate = max(round(GRID_S / recording.sample_time_s), 1)
-    always = {s: PROCESS[k] for s in plant.state_list if (k := s.rpartition(".")[2]) in PROCESS}
+    noise = dict(zip(plant.measured, windows.noise, strict=True))
+    always = process_noise(plant, pace)
+    decimate = max(round(_grid_s(plant, windows) / recording.sample_time_s), 1)
 
     def lacking(unknown: dict[str, float]) -> PlantFilter:
         return recording_filter(plant, recording, unknown, noise, always, decimate)
 
-    gains = _gains(suspects, lacking, recording)
+    gains = _gains(suspected, lacking, recording)
     if not gains:
         return None
-    worst = max(gains, key=lambda s: gains[s][0])
-    result = smooth(lacking({worst.state: gains[worst][1]}), recording)
-    term = result.unknown[0] * worst.factor
+    worst = _worst(gains)
+    result = smooth(lacking({worst.parameter: gains[worst][1]}), recording)
+    term = result.unknown[0]
     return Where(
         balance=worst.balance,
         by_balance={s.balance: gain for s, (gain, _) in gains.items()},
-        term_name=worst.term_name,
+        term_name=worst.term,
         time_s=result.time_s,
         term=term,
-        term_deviation=result.unknown_deviation[0] * abs(worst.factor),
+        term_deviation=result.unknown_deviation[0],
         against=_dependences(plant, recording, result, term, decimate),
         by_regime=regime_shares(problem.base),
     )
 
 
+def _grid_s(plant: Plant, windows: Windows) -> float:
+    """Step of the filter: what moves is followed closely, what does not as slowly as it goes."""
+    return GRID_S if moves(plant) else windows.length * windows.recordings[0].sample_time_s / STEPS
+
+
+def _worst(gains: Mapping[Suspect, tuple[float, float]]) -> Suspect:
+    """The balance that gains most; heat only where it gains clearly more than the gas."""
+    named = {suspect.balance: gain for suspect, (gain, _) in gains.items()}
+    heat, gas = f".{Balance.ENERGY.value}", f".{Balance.MASS.value}"
+
+    def counted(suspect: Suspect) -> float:
+        gain = named[suspect.balance]
+        rival = named.get(suspect.balance.removesuffix(heat) + gas)
+        hidden = suspect.balance.endswith(heat) and rival and gain < CLEARLY_MORE * rival
+        return -np.inf if hidden else gain
+
+    return max(gains, key=counted)
+
+
 def acts_in(candidate: Candidate, balance: str) -> bool:
     """True where a cause enters a balance, as :attr:`Where.balance` names it.
 
-    What acts on flows shows in the mass of every chamber, and what acts in one place only there.
+    What acts on flows shows in the gas of every chamber, and what acts in one place only there.
     """
     place, _, kind = balance.rpartition(".")
     own = candidate.cause.balance
@@ -101,46 +110,20 @@ def acts_in(candidate: Candidate, balance: str) -> bool:
 
 
 def _gains(
-    suspects: list[Suspect],
+    suspected: list[Suspect],
     lacking: Callable[[dict[str, float]], PlantFilter],
     recording: Recording,
 ) -> dict[Suspect, tuple[float, float]]:
     """Log-likelihood that each suspect gains over a model without it, and at which intensity."""
-    intensities = {s: INTENSITIES[s.state.rpartition(".")[2]] for s in suspects}
-    trials = [(s, q) for s in suspects for q in intensities[s]]
-    known = lacking({s.state: intensities[s][0] for s in suspects})
-    factors = [[q / intensities[s][0] * (s is each) for s, q in trials] for each in suspects]
+    trials = [(s, q) for s in suspected for q in s.intensities]
+    known = lacking({s.parameter: s.intensities[0] for s in suspected})
+    factors = [[q / each.intensities[0] * (s is each) for s, q in trials] for each in suspected]
     plain, *likely = log_likelihoods(known, recording, np.pad(factors, ((0, 0), (1, 0))))
     gains: dict[Suspect, tuple[float, float]] = {}
     for (suspect, q), gain in zip(trials, likely - plain, strict=True):
         if np.isfinite(gain) and gain > gains.get(suspect, (-np.inf, q))[0]:
             gains[suspect] = float(gain), q
     return gains
-
-
-def _suspects(plant: Plant) -> list[Suspect]:
-    """One per body, link and chamber; pressures stand for the mass balance of their chamber.
-
-    dp/dt = kappa R T / V mdot, so a missing mass flow is V / (kappa R T) times the missing rate.
-    """
-    found = []
-    for part in plant.parts:
-        if isinstance(part, Body):
-            mass = float(part.mass_kg)
-            state = f"{part.name}.velocity_m_s"
-            found.append(Suspect(f"{part.name}.momentum", state, "force_n", mass))
-        if isinstance(part, Link):
-            state = f"{part.joint}.velocity_rad_s"
-            inertia = float(part.inertia_kg_m2)
-            found.append(Suspect(f"{part.joint}.momentum", state, "torque_n_m", inertia))
-        if isinstance(part, Chamber) and any(isinstance(p, Body | Joint) for p in plant.parts):
-            volume = float(part.dead_volume_m3) + float(part.area_m2 * part.stroke_m) / 2
-            factor = volume / (
-                HEAT_CAPACITY_RATIO * part.gas_constant_j_kg_k * part.initial_temperature_k
-            )
-            state = f"{part.name}.pressure_pa"
-            found.append(Suspect(f"{part.name}.mass", state, "mass_flow_kg_s", factor))
-    return found
 
 
 def _dependences(

@@ -14,7 +14,7 @@ from workbench.effects.forces import (
 )
 from workbench.effects.friction_thermal import ThermalFriction
 from workbench.effects.joints import JointFriction, LinkGravity
-from workbench.effects.leaks import ChamberLeak, PistonLeak
+from workbench.effects.leaks import ChamberLeak, HairlineLeak, PistonLeak
 from workbench.effects.lever_link import LeverLink
 from workbench.effects.line_delay import LineDelay
 from workbench.effects.piston_contact import PistonContact
@@ -40,7 +40,7 @@ from workbench.effects.valve_command import (
     ValveOffset,
 )
 from workbench.effects.valve_hysteresis import ValveHysteresis
-from workbench.effects.wall_heat import ConstantWallHeat, HeatedWall, WallHeat
+from workbench.effects.wall_heat import ConstantWallHeat, HeatedWall, StillWall, WallHeat
 
 CATALOGUE = (
     AngleSensorOffset,
@@ -56,6 +56,7 @@ CATALOGUE = (
     EndCushion,
     EndStops,
     FivePortValve,
+    HairlineLeak,
     HeatedWall,
     JointFriction,
     LeverLink,
@@ -75,6 +76,7 @@ CATALOGUE = (
     SensorScale,
     SolenoidValve,
     SpringForce,
+    StillWall,
     StribeckFriction,
     StuckBand,
     SupplyDroop,

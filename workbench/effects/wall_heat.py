@@ -105,6 +105,7 @@ class HeatedWall(WallHeat):
             strength="heating_k_j",
             forms=("wall_time_s",),
             shapes={"wall_time_s": (30.0, 200.0)},
+            needs="coefficient_w_m2_k",
             balance=Balance.ENERGY,
             drivers=("heat given off so far",),
             shown_by="fill, close the valve, log the pressure for minutes",
@@ -124,3 +125,14 @@ class HeatedWall(WallHeat):
     def rates(self, now: Conditions, received: Received) -> dict[str, Expression]:
         given_w = sum(term.value for term in self.terms(now))
         return {"stored_j": -given_w - now[self.name].stored_j / self.wall_time_s}
+
+
+@dataclass(frozen=True, kw_only=True)
+class StillWall(HeatedWall):
+    """The same around gas at rest, which gives its heat to the wall by natural convection alone.
+
+    Typical is 5 W/(m^2 K), of 2 to 25 for gases (Incropera, "Fundamentals of heat and mass
+    transfer", table 1.1).
+    """
+
+    coefficient_w_m2_k: Expression = strength(typical=5.0, upper=1e3)

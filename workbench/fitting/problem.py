@@ -5,21 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from workbench.fitting.gauss_newton import Fit, fit_windows, points_costs
 from workbench.fitting.linearised import Linearised, Point
 from workbench.fitting.noise import measured_noise
 from workbench.fitting.start_states import refit_starts
 from workbench.fitting.unknowns import Unknowns, nominal_unknowns
-from workbench.fitting.windows import MOST_WINDOWS, WINDOW_S, cut_windows, one_clock, position_alone
+from workbench.fitting.window_length import window_length_s
+from workbench.fitting.windows import MOST_WINDOWS, cut_windows, one_clock
 from workbench.plant import Candidate, Plant
 from workbench.recording import Recording
 from workbench.rig import Rig
 
-LONGEST_PIECE_S = 2.0  # of recordings of a position alone whose pieces stay whole
-STUB = 0.5  # of the median length: shorter pieces of such recordings are left out
-POSITION_WINDOW_S = 0.5  # of longer ones
 FIRST_ITERATIONS = 3  # with scales from the model as it came
 ITERATIONS = 12  # with scales from the first fit
 LEAST_HELD_OUT_WINDOWS = 24
@@ -133,7 +129,7 @@ def pose(
     added = rig.added_to(whole)
     plant = staged(whole, *(c.member for c in added))
     noise = measured_noise(train, plant.measured)
-    length_s = window_length_s(plant, [*train, *validation])
+    length_s = window_length_s(plant, train, validation)
     windows = cut_windows(plant, train, noise, length_s, most_windows)
     unknowns = nominal_unknowns(plant, rig.deviations, rig.fixed, added)
     windows = windows.rescaled(windows.residuals([plant], windows.start)[0])
@@ -145,20 +141,6 @@ def pose(
         most = max(len(windows) // 2, LEAST_HELD_OUT_WINDOWS)
         held_out = _held_out(validation, base, noise, most)
     return Problem(rig, whole, added, base, held_out)
-
-
-def window_length_s(plant: Plant, recordings: Sequence[Recording]) -> float:
-    """Windows are short where pressures are recorded too.
-
-    A position alone says little of flows and forces in a fifth of a second.  Short experiments,
-    such as kicks from rest, stay whole, or as long as the shortest of them: each has a start of its
-    own.  A piece less than half as long as most is a stub that gets no window.
-    """
-    if not position_alone(plant):
-        return WINDOW_S
-    lengths_s = np.array([len(p) * r.sample_time_s for r in recordings for p in r.pieces])
-    shortest_s = float(lengths_s[lengths_s >= STUB * np.median(lengths_s)].min())
-    return shortest_s if shortest_s <= LONGEST_PIECE_S else POSITION_WINDOW_S
 
 
 def _held_out(

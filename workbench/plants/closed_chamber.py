@@ -11,7 +11,7 @@ Source: physics.md 2.7 and the chamber decay of the data set printed_cylinder.
 
 from __future__ import annotations
 
-from workbench.effects import ChamberLeak, HeatedWall
+from workbench.effects import HairlineLeak, StillWall
 from workbench.parts import Atmosphere
 from workbench.plant import Plant
 from workbench.vessel import Vessel
@@ -35,8 +35,8 @@ def closed_chamber() -> Plant:
             ),
         ),
         effects=(
-            ChamberLeak(name="chamber_leak", chamber="chamber"),
-            HeatedWall(name="wall_heat", chambers=("chamber",), wall="atmosphere"),
+            HairlineLeak(name="chamber_leak", chamber="chamber"),
+            StillWall(name="wall_heat", chambers=("chamber",), wall="atmosphere"),
         ),
         measured=("chamber.pressure_pa",),
     )
