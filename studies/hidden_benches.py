@@ -85,7 +85,9 @@ SERVO_DRIVE = Bench(
     always_there=("valve_lag", "command_delay", "sensor_lag", "friction_position"),
     places={
         "chamber_leak": "chamber_leak@chamber_a",
+        "chamber_leak_b": "chamber_leak@chamber_b",
         "sensor_offset": "sensor_offset@chamber_a.pressure",
+        "sensor_scale": "sensor_scale@slide.position",
     },
 )
 CRR_RIG = Bench(

@@ -12,7 +12,7 @@ import pytest
 from studies.hidden_benches import SERVO_DRIVE
 from studies.hidden_effects import answer, confusion, recordings
 from studies.truth.cases import read_cases
-from studies.truth.draw import HIDDEN
+from studies.truth.draw import FIRST
 from workbench.diagnosis.result import DecidedBy, Verdict
 
 SEED = 1
@@ -47,7 +47,7 @@ def test_a_hidden_effect_comes_first_with_its_size(hidden):
 
 @pytest.mark.slow
 def test_of_twelve_hidden_effects_ten_come_first_and_all_at_least_in_a_printed_tie():
-    found = [diagnosed(hidden, HIDDEN) for hidden in HIDDEN]
+    found = [diagnosed(hidden, FIRST) for hidden in FIRST]
     first = [each for each in found if each.place == 1]
 
     assert len(first) >= 10, confusion(found)

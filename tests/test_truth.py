@@ -174,7 +174,7 @@ def test_every_effect_is_absent_at_its_null(name):
     off, on = drive_of(case, "hidden"), drive_of(case)
     assert off != on
     share = abs(case.size) / draws.EFFECTS[name].typical
-    assert 0.15 <= share <= 0.60
+    assert 0.10 <= share <= 0.60
     if name == "supply_droop":
         assert off.tank_per_m3 == 0.0 and on.tank_per_m3 == pytest.approx(1e3)
     else:

@@ -53,6 +53,7 @@ def _chamber_constants(p: d.Drive, step_s: float) -> dict:
         surface_1=perimeter,
         heat=p.heat_transfer_w_m2_k / np.sqrt(d.HEAT_PRESSURE_PA * d.HEAT_TEMPERATURE_K),
         wall_gain=step_s * p.wall_k_per_j,
+        asymmetric=bool(np.any(p.discharge_asymmetry != 0)),
         droops=bool(np.any(p.tank_per_m3 > 0)),
         walls=bool(np.any(p.wall_k_per_j > 0)),
         tank_gain=step_s * d.KAPPA * d.GAS_CONSTANT_J_KG_K * p.supply_temperature_k * p.tank_per_m3,
@@ -86,7 +87,7 @@ def _buffers(p: d.Drive, substeps: int) -> SimpleNamespace:
     outside_k[:2], outside_k[2:] = p.supply_temperature_k, p.ambient_temperature_k
     area = np.zeros((substeps, *six))
     area[:, [1, 3]] = p.spool_leak_m2
-    area[:, 4, 0] = p.chamber_a_leak_m2
+    area[:, 4] = np.stack([p.chamber_a_leak_m2, p.chamber_b_leak_m2])
     area[:, 5] = p.piston_leak_m2
     names = ("difference", "up", "ratio", "cell", "psi", "slope", "flow", "up_k", "enthalpy")
     return SimpleNamespace(

@@ -36,7 +36,11 @@ class Drive:
     Friction by direction is mean and asymmetry: value = mean (1 + asymmetry sign v); the means
     and asymmetries reproduce the two columns of paper 002, table 5.
     `constant_force_n` pushes towards larger y. `pressure_a_offset_pa` is added by the sensor.
-    `exhaust_restriction` multiplies both exhaust areas by one minus itself.
+    `exhaust_restriction` multiplies both exhaust areas by one minus itself, `supply_restriction`
+    the supply areas; `discharge_asymmetry` makes lands wider for flow into a chamber.
+    `play_share` and `stuck_band_share` are shares of the command's range: the spool moves once the
+    command is further away than the play, and stays shut below centre within the band.
+    The spring pulls to mid-stroke. `position_scale` is the position sensor's error of gain.
     `tank_per_m3` is the reciprocal of the tank volume; 0 is an ideal supply.
     """
 
@@ -46,13 +50,20 @@ class Drive:
     flow_area: float = 1.0
     area_exponent: float = 1.6
     exhaust_restriction: float = 0.0
+    supply_restriction: float = 0.0
+    discharge_asymmetry: float = 0.0
     dead_zone_centre_v: float = 4.95
     dead_zone_half_width_v: float = 0.42
+    underlap_v: float = 0.0
+    valve_offset_v: float = 0.0
+    play_share: float = 0.0
+    stuck_band_share: float = 0.0
     valve_period_s: float = 0.0
     valve_damping: float = 1.0
     valve_lag_s: float = 0.0
     spool_leak_m2: float = 8e-8
     chamber_a_leak_m2: float = 0.0
+    chamber_b_leak_m2: float = 0.0
     piston_leak_m2: float = 0.0
     supply_pressure_pa: float = 7e5
     supply_temperature_k: float = 293.15
@@ -75,8 +86,10 @@ class Drive:
     presliding_share: float = 0.9
     quadratic_drag_n_s2_m2: float = 0.0
     constant_force_n: float = 0.0
+    spring_n_m: float = 0.0
     pressure_lag_s: float = 0.0
     pressure_a_offset_pa: float = 0.0
+    position_scale: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -84,7 +97,8 @@ class State:
     """What the integrator carries, outermost axis first, columns last.
 
     Chamber arrays have shape (2, n): a, then b. `valve` has shape (3, n): lagged command, spool
-    in volt, spool increment of one step. `read_pa` is what lagged pressure sensors hold.
+    in volt, spool increment of one step. `left_v` is where the play left the command, `read_pa`
+    what lagged pressure sensors hold.
     """
 
     pressure_pa: np.ndarray
@@ -95,6 +109,7 @@ class State:
     bristle_m: np.ndarray
     supply_pa: np.ndarray
     valve: np.ndarray
+    left_v: np.ndarray
     read_pa: np.ndarray
 
 
@@ -118,5 +133,6 @@ def at_rest(drive: Drive, position_m, pressure_pa=5.65e5, command_v: float = 4.9
         bristle_m=np.zeros(n),
         supply_pa=np.broadcast_to(drive.supply_pressure_pa, (n,)).astype(float),
         valve=np.stack([volt, volt, np.zeros(n)]),
+        left_v=volt.astype(float),
         read_pa=pressure.copy(),
     )

@@ -26,12 +26,14 @@ _INTERCEPT, _SLOPE = tables()
 def advance(b: Bench, state: d.State, command_v: np.ndarray) -> d.State:
     """State one sample later, the command of shape (n_columns,) held constant."""
     c, w = b.constant, b.buffer
-    inputs = np.concatenate([state.valve, command_v[None]])
+    play = d.COMMAND_RANGE_V * b.drive.play_share
+    left = np.clip(state.left_v, command_v - play, command_v + play)
+    inputs = np.concatenate([state.valve, left[None]])
     _open_lands(b, (c.spool_response * inputs).sum(axis=1))
     s = _unpack(b, state)
     stops = bool(np.any(np.abs(state.position_m - d.STROKE_M / 2) > d.STROKE_M / 2 - 5e-3))
     for j in range(b.substeps):
-        _flows(w, s, w.area[j], c.droops)
+        _flows(b, s, w.area[j])
         _mechanics(b, s, stops)
         _chambers(b, s)
         w.history[j] = s.pressure
@@ -45,6 +47,7 @@ def advance(b: Bench, state: d.State, command_v: np.ndarray) -> d.State:
         s.bristle,
         s.supply,
         (c.valve_response * inputs).sum(axis=1),
+        left,
         read,
     )
 
@@ -72,25 +75,30 @@ def _unpack(b: Bench, state: d.State) -> SimpleNamespace:
 def _open_lands(b: Bench, spool_v: np.ndarray) -> None:
     """Areas of the four controlled lands for every substep, from spool volts (substeps, n).
 
-    s = (u - u_c - w)/(10 - u_c - w) or (u_c - w - u)/(u_c - w);  A = A_max f (1 - (1 - s)^e).
+    s = (u - u_c - w)/(10 - u_c - w) or (u_c - w - u)/(u_c - w);  A = A_max f (1 - (1 - s)^e),
+    where an underlap opens every land from its own side of the edge on.
     """
     p = b.drive
-    past = spool_v - p.dead_zone_centre_v
-    half = p.dead_zone_half_width_v
-    upper = (past - half) / (d.COMMAND_RANGE_V - p.dead_zone_centre_v - half)
-    lower = (-past - half) / (p.dead_zone_centre_v - half)
+    past = spool_v - p.valve_offset_v - p.dead_zone_centre_v
+    half, lap = p.dead_zone_half_width_v, p.underlap_v
+    up, down = np.maximum(past - half, 0.0), np.maximum(-past - half, 0.0)
+    down = np.where(down < d.COMMAND_RANGE_V * p.stuck_band_share, 0.0, down)
+    net = up - down
+    upper = (net + lap) / (d.COMMAND_RANGE_V - p.dead_zone_centre_v - half + lap)
+    lower = (lap - net) / (p.dead_zone_centre_v - half + lap)
     opening = np.clip(np.stack([upper, lower], axis=1), 0.0, 1.0)
     area = d.FULL_AREA_M2 * p.flow_area * (1 - (1 - opening) ** p.area_exponent)
-    b.buffer.area[:, 0] = d.SUPPLY_AREA_SHARE * area
+    b.buffer.area[:, 0] = d.SUPPLY_AREA_SHARE * (1 - p.supply_restriction) * area
     exhaust = d.EXHAUST_AREA_SHARE * (1 - p.exhaust_restriction)
     b.buffer.area[:, 2] = exhaust * area[:, ::-1]
 
 
-def _flows(w: SimpleNamespace, s: SimpleNamespace, area: np.ndarray, droops: bool) -> None:
+def _flows(b: Bench, s: SimpleNamespace, area: np.ndarray) -> None:
     """Mass flow and enthalpy flow over c_p into the chambers, rows as in `restriction`."""
+    w = b.buffer
     w.outside_pa[5] = s.pressure[::-1]
     w.outside_k[5] = s.temperature[::-1]
-    if droops:
+    if b.constant.droops:
         w.outside_pa[:2] = s.supply
     np.subtract(w.outside_pa, s.pressure, out=w.difference)
     np.maximum(w.outside_pa, s.pressure, out=w.up)
@@ -105,6 +113,8 @@ def _flows(w: SimpleNamespace, s: SimpleNamespace, area: np.ndarray, droops: boo
     np.multiply(w.psi, area, out=w.psi)
     np.multiply(w.psi, w.up, out=w.psi)
     np.greater(w.difference, 0.0, out=w.inward)
+    if b.constant.asymmetric:
+        w.psi[0:3:2] *= 1 + b.drive.discharge_asymmetry * np.where(w.inward[0:3:2], 1.0, -1.0)
     np.copyto(w.up_k, s.temperature)
     np.copyto(w.up_k, w.outside_k, where=w.inward)
     np.sqrt(w.up_k, out=w.slope)
@@ -127,6 +137,7 @@ def _mechanics(b: Bench, s: SimpleNamespace, stops: bool) -> None:
     slip = 1 + (0.5 * dt) * (1 - np.cos(np.pi * share)) * speed * rate
     stiff = c.stiff / slip
     force = (s.pressure[0] - s.pressure[1]) * d.PISTON_AREA_M2 + p.constant_force_n
+    force -= p.spring_n_m * (s.position - d.STROKE_M / 2)
     if stops:
         force += _stop_force(s.position, v)
     drag = viscous + p.quadratic_drag_n_s2_m2 * speed
@@ -191,7 +202,7 @@ def open_loop(
 def observed(drive: d.Drive, state: d.State) -> dict[str, np.ndarray]:
     """Noise-free readings and the chamber truth of one instant."""
     return dict(
-        position_m=state.position_m,
+        position_m=state.position_m * (1 + drive.position_scale),
         velocity_m_s=state.velocity_m_s,
         pressure_a_pa=state.read_pa[0] + drive.pressure_a_offset_pa,
         pressure_b_pa=state.read_pa[1],

@@ -35,15 +35,17 @@ def misfits(cases: Sequence[Case]) -> list[Misfit]:
 
 
 def _starts(state: d.State, column: int, case: Case, names: Sequence[str]) -> d.State:
-    """The true state once per variant; without a sensor offset, the reading is the state.
+    """The true state once per variant; without an error of a sensor, the reading is the state.
 
-    Otherwise an offset would only shift one output, although a model that does not know of it
-    also starts every window at the wrong pressure.
+    Otherwise it would only shift one output, although a model that does not know of it also starts
+    every window at the wrong place.
     """
     start = take(state, np.full(len(names), column))
     if case.hidden == "sensor_offset":
         start.pressure_pa[0, names.index("hidden")] += case.size
         start.read_pa[0, names.index("hidden")] += case.size
+    if case.hidden == "sensor_scale":
+        start.position_m[names.index("hidden")] *= 1 + case.size
     return start
 
 
