@@ -35,10 +35,10 @@ def comparison_figures(found: Comparison, prefix: str = "") -> dict[str, Figure]
         if each.by_regime:
             figures[f"{prefix}regimes_{name}"] = regime_figure(each)
         if each.over_motion:
-            title = f"{each.name}: error over position and speed, {each.judged}"
+            title = f"{each.name}, {each.judged}\nerror over position and speed"
             figures[f"{prefix}error_over_motion_{name}"] = map_figure(each.over_motion, title)
         if each.over_command:
-            title = f"{each.name}: error over command and pressure, {each.judged}"
+            title = f"{each.name}, {each.judged}\nerror over command and pressure"
             figures[f"{prefix}error_over_command_{name}"] = map_figure(each.over_command, title)
         figures[f"{prefix}residuals_{name}"] = residual_figure(each)
     return figures

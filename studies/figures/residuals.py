@@ -46,7 +46,8 @@ def _draw_spectrum(axes: Axes, name: str, residual: Residual) -> None:
     axes.loglog(
         residual.frequency_hz[1:], per * residual.density[1:], "-", color=BLUE, label="error"
     )
-    axes.xaxis.set_minor_formatter(NullFormatter())
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_minor_formatter(NullFormatter())
     axes.axhline(per * residual.floor, color=RED, linestyle="--", label="noise alone")
     axes.set_ylabel(f"{_words(name)}\n({_squared(display_unit(name))}/Hz)")
 
