@@ -18,16 +18,15 @@ from workbench.air import (
 )
 from workbench.effect import (
     Balance,
-    BalanceEquation,
     Conditions,
     Expression,
     HeatFlow,
     MassFlow,
-    Part,
     Received,
     State,
     Term,
 )
+from workbench.part import BalanceEquation, Part
 
 LOWEST_MASS_KG = 1e-9
 PRESSURE_RATES = (1e5, 1e6)

@@ -7,17 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from workbench.effect import (
-    BalanceEquation,
-    Conditions,
-    Expression,
-    Part,
-    Received,
-    State,
-    Torque,
-    form,
-)
+from workbench.effect import Conditions, Expression, Received, State, Torque, form
 from workbench.linkage import TURNING
+from workbench.part import BalanceEquation, Part
 from workbench.parts import total
 
 

@@ -16,19 +16,18 @@ import numpy as np
 
 from workbench.effect import (
     Balance,
-    BalanceEquation,
     Cause,
     Conditions,
     Expression,
     Force,
     Kind,
-    Part,
     Received,
     State,
     Torque,
     form,
     strength,
 )
+from workbench.part import BalanceEquation, Part
 from workbench.parts import total
 
 TURNING = BalanceEquation(

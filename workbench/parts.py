@@ -12,13 +12,11 @@ import numpy as np
 from workbench.effect import (
     AddedMass,
     Balance,
-    BalanceEquation,
     Cause,
     Conditions,
     Expression,
     Force,
     Kind,
-    Part,
     Received,
     State,
     Term,
@@ -26,6 +24,7 @@ from workbench.effect import (
     strength,
 )
 from workbench.gas_volume import GasVolume, total
+from workbench.part import BalanceEquation, Part
 
 
 @dataclass(frozen=True, kw_only=True)

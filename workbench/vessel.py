@@ -10,12 +10,10 @@ import numpy as np
 
 from workbench.effect import (
     Balance,
-    BalanceEquation,
     Cause,
     Conditions,
     Expression,
     Kind,
-    Part,
     Received,
     State,
     Term,
@@ -23,6 +21,7 @@ from workbench.effect import (
     strength,
 )
 from workbench.gas_volume import PRESSURE_RATES, GasVolume, total
+from workbench.part import BalanceEquation, Part
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -51,7 +51,7 @@ CERTAIN_SHARE = 0.5  # an accepted candidate above it needs no comparison with a
 
 WEAK_EVIDENCE = "no validation recording: the last third is held out, which is weak evidence"
 
-FEW_SAMPLES = "few held-out samples are independent of each other, which is weak evidence"
+FEW_WINDOWS = "what is held out is no more than a few slow decays, which is weak evidence"
 
 NO_EVIDENCE = "a validation recording is one of the training recordings, which proves nothing"
 
@@ -96,7 +96,7 @@ def diagnose(
     progress("prior fit")
     problem = pose(rig, train, validation, most_windows)
     if too_few(problem.base_validation):
-        held_out, warnings = False, (*warnings, FEW_SAMPLES)
+        held_out, warnings = False, (*warnings, FEW_WINDOWS)
     if not problem.base.converged:
         warnings += ("the prior fit did not converge: the ranking is provisional",)
     progress("where it fails")

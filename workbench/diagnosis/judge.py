@@ -7,7 +7,7 @@ the criterion.  A candidate is accepted when
    dBIC = dchi2 / s2 - k ln(n_eff) with s2 the misfit per effective sample of the better model,
 2. a held-out recording with frozen parameters is predicted better by more than 2 %, and its plain
    squared error, in which single windows may count for much, does not grow by more than 2 %;
-   where few samples of it are independent, it does not grow by more than chance explains,
+   where only a few slow decays are held out, it does not grow by more than chance explains,
 3. at least 20 % of the misfit beyond noise goes away, as the mean over training and held-out
    recordings and with no less than 10 % in training: less may stand for something else,
 4. its size is inside its bounds, more than 3 % of typical, and more than two standard deviations
@@ -32,7 +32,7 @@ LEAST_SHARE = 0.20
 LEAST_TRAINING = 0.10
 LEAST_SIZE = 0.03
 DISTINCT = 2.0  # posterior standard deviations
-FEWEST_SAMPLES = 30.0  # independent ones, for held-out recordings of what does not move to refuse
+FEWEST_WINDOWS = 6  # held out, for recordings of what does not move to refuse anything
 LARGEST_TIE = 3
 SAME_DIRECTION = 0.9  # cosine of two signatures that are one
 CLOSE_DROP = 0.25  # of the leader's drop: within it the order is not to be trusted
@@ -62,7 +62,7 @@ def reasons_against(base: Fit, refit: Refit, parameters: int = 0) -> tuple[str, 
 def predicts(refit: Refit) -> bool:
     """True where the held-out recording is predicted better, or there is none.
 
-    A handful of independent samples refuses nothing that chance explains: the misfit of n of them
+    A handful of windows refuses nothing that chance explains: the misfit of n independent samples
     is known to sqrt(2/n).
     """
     if isnan(refit.drop_validation):
@@ -75,14 +75,14 @@ def predicts(refit: Refit) -> bool:
 
 
 def too_few(held_out: Fit | None) -> bool:
-    """True where held-out recordings of what does not move hold next to no independent samples.
+    """True where what is held out does not move and fills no more than a few windows.
 
-    So it is with a decay slower than its recording: a sensor that wanders by as much as the
-    pressure falls says a few things in a minute, not six hundred.
+    So it is with a decay slower than its recording, which is one window: a sensor that wanders by
+    as much as the pressure falls says a few things in a minute, not six hundred.
     """
     if held_out is None or moves(held_out.windows.plant):
         return False
-    return effective_samples(held_out) < FEWEST_SAMPLES
+    return len(held_out.windows) < FEWEST_WINDOWS
 
 
 def _share(refit: Refit) -> float:

@@ -1,6 +1,6 @@
 """The balances that may lack a flow, and a filter in which each may have an unknown one.
 
-Every part declares what it balances (:attr:`workbench.effect.Part.balances`).  Here each balance
+Every part declares what it balances (:attr:`workbench.part.Part.balances`).  Here each balance
 gets a term of unknown size, a parameter that the filter lets wander: a missing force stands in N,
 a missing flow in kg/s, a missing heat in W, whatever state rates it drives by the part's equations.
 
@@ -15,9 +15,10 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from workbench.effect import BalanceEquation, Conditions, Effect, Expression, Term, strength
+from workbench.effect import Conditions, Effect, Expression, Term, strength
 from workbench.fitting.starts import guessed_states
 from workbench.fitting.windows import Windows
+from workbench.part import BalanceEquation
 from workbench.plant import Plant
 from workbench.recording import Recording
 from workbench.simulation import inputs

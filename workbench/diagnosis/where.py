@@ -30,13 +30,12 @@ from workbench.effect import Balance
 from workbench.filtering import FilterResult, log_likelihoods, recording_filter, smooth
 from workbench.fitting.problem import Problem
 from workbench.fitting.window_length import moves
-from workbench.fitting.windows import Windows
 from workbench.plant import Candidate, Plant
 from workbench.plant_filter import PlantFilter
 from workbench.recording import Recording
 
-GRID_S = 5e-3  # of the filter where something moves
-STEPS = 40  # of the filter in a window where nothing does
+GRID_S = 5e-3  # of the filter
+LONGEST = 2000  # steps of the filter where nothing does
 CLEARLY_MORE = 1.05  # times the gain of the mass balance
 BINS = 15
 INTO_GAS = (Balance.VALVE, Balance.FLOW, Balance.MASS, Balance.ENERGY, Balance.SUPPLY)
@@ -55,7 +54,7 @@ def locate(problem: Problem, recordings: Sequence[Recording]) -> Where | None:
         return None
     noise = dict(zip(plant.measured, windows.noise, strict=True))
     always = process_noise(plant, pace)
-    decimate = max(round(_grid_s(plant, windows) / recording.sample_time_s), 1)
+    decimate = max(round(_grid_s(plant, recording) / recording.sample_time_s), 1)
 
     def lacking(unknown: dict[str, float]) -> PlantFilter:
         return recording_filter(plant, recording, unknown, noise, always, decimate)
@@ -78,9 +77,10 @@ def locate(problem: Problem, recordings: Sequence[Recording]) -> Where | None:
     )
 
 
-def _grid_s(plant: Plant, windows: Windows) -> float:
-    """Step of the filter: what moves is followed closely, what does not as slowly as it goes."""
-    return GRID_S if moves(plant) else windows.length * windows.recordings[0].sample_time_s / STEPS
+def _grid_s(plant: Plant, recording: Recording) -> float:
+    """Step of the filter: what moves is followed closely, what rests for minutes more coarsely."""
+    length_s = len(recording) * recording.sample_time_s
+    return GRID_S if moves(plant) else max(GRID_S, length_s / LONGEST)
 
 
 def _worst(gains: Mapping[Suspect, tuple[float, float]]) -> Suspect:

@@ -23,6 +23,7 @@ STUB = 0.5  # of the median length: shorter pieces are left out, and so set no l
 POSITION_WINDOW_S = 0.5  # of longer ones
 FEWEST_SAMPLES = 20  # of a window: a fast sensor at 1 kHz fills them in a tenth of one
 TIME_CONSTANTS = 3.0  # in a window: diagnosis.md asks for two to five
+ENOUGH_WINDOWS = 24  # of a training: with fewer, little of what is held out is independent
 POINTS = 50  # at which a recording is linearised
 MOTIONS = ("position_m", "angle_rad")
 GAS = ("pressure_pa", "mass_kg")
@@ -37,9 +38,10 @@ def window_length_s(
     such as kicks from rest, stay whole, or as long as the shortest of them: each has a start of its
     own.  A piece less than half as long as most is a stub that gets no window.
 
-    Where nothing moves, a window lasts three time constants of the gas; a decay that is slower than
-    that stays whole, or as long as the shortest: sensors wander, and a slope is told from that the
-    better the longer it is seen.  No window has fewer than 20 samples.
+    Where nothing moves, a window lasts three time constants of the gas, or a 24th of the training
+    where that is less; a decay so slow that its recording holds no three stays whole, or as long as
+    the shortest: sensors wander, and a slope is told from that the better the longer it is seen.
+    No window has fewer than 20 samples.
     """
     least_s = FEWEST_SAMPLES * train[0].sample_time_s
     shortest_s = _shortest_piece_s([*train, *validation])
@@ -48,9 +50,18 @@ def window_length_s(
     elif moves(plant) or not plant.state_list:
         wanted_s = WINDOW_S
     else:
-        wanted_s = min(TIME_CONSTANTS * time_constant_s(plant, train), shortest_s)
+        wanted_s = _of_gas_s(plant, train, shortest_s)
         wanted_s = shortest_s / np.ceil(shortest_s / max(wanted_s, least_s))
     return float(max(wanted_s, least_s))
+
+
+def _of_gas_s(plant: Plant, train: Sequence[Recording], shortest_s: float) -> float:
+    """Three time constants, but enough windows to judge by; all of what is slower than that."""
+    wanted_s = TIME_CONSTANTS * time_constant_s(plant, train)
+    if wanted_s >= shortest_s:
+        return shortest_s
+    total_s = sum(len(recording) * recording.sample_time_s for recording in train)
+    return min(wanted_s, total_s / ENOUGH_WINDOWS)
 
 
 def moves(plant: Plant) -> bool:

@@ -50,7 +50,8 @@ from workbench.effects import (
 from workbench.effects.sensors import sensor_flaws
 from workbench.floating_piston import ControlChamber, FloatingPiston, SharedChamber
 from workbench.lever import Lever, LeverLoad
-from workbench.parts import Atmosphere, Body, Chamber, Part, Supply
+from workbench.part import Part
+from workbench.parts import Atmosphere, Body, Chamber, Supply
 from workbench.plant import Plant, Signal
 
 SUPPLY_PA = 9.0e5

@@ -1,0 +1,258 @@
+"""Diagnosis of what does not move: window lengths, the balances that may lack a flow, and decays.
+
+Made decays come from a few lines of NumPy with the ideal gas and a nozzle or a warm wall, none of
+it the workbench's.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from workbench.diagnosis.diagnose import diagnose
+from workbench.diagnosis.result import Verdict
+from workbench.diagnosis.suspects import pace_of, process_noise, suspects, with_missing_flows
+from workbench.diagnosis.where import locate
+from workbench.effect import Balance, State, Term
+from workbench.fitting.problem import pose
+from workbench.fitting.window_length import time_constant_s, window_length_s
+from workbench.part import BalanceEquation, Part
+from workbench.plant import Plant
+from workbench.plants import PLANTS
+from workbench.recording import Recording
+from workbench.recordings import chamber_decay, real_data_folder
+from workbench.rig import default_rig
+from workbench.units import display_unit
+
+PRESSURE = "chamber.pressure_pa"
+DATA = real_data_folder()
+GAMMA, GAS_J_KG_K, ROOM_K = 1.4, 287.05, 293.15
+VOLUME_M3, SURFACE_M2 = 1e-4, 1.3e-2  # those that the plant takes for granted
+NOISE_PA, SAMPLE_S = 100.0, 0.1
+
+
+def decay(seconds, seed, start_pa=8e5, area_m2=0.0, warmer_k=0.0, heat_w_k=0.0):
+    """Pressure of a rigid chamber with a choked leak and heat to a wall, Euler steps of 10 ms."""
+    random, dt = np.random.default_rng(seed), 0.01
+    pressure, temperature, seen = start_pa, ROOM_K + warmer_k, []
+    choked = np.sqrt(GAMMA / GAS_J_KG_K) * (2 / (GAMMA + 1)) ** ((GAMMA + 1) / (2 * GAMMA - 2))
+    for k in range(round(seconds / dt)):
+        if k % 10 == 0:
+            seen.append(pressure)
+        mass = pressure * VOLUME_M3 / (GAS_J_KG_K * temperature)
+        lost = area_m2 * choked * pressure / np.sqrt(temperature)
+        heat = heat_w_k * (ROOM_K - temperature)
+        energy = -GAMMA * GAS_J_KG_K * temperature * lost + (GAMMA - 1) * heat
+        pressure += dt * energy / VOLUME_M3
+        temperature = pressure * VOLUME_M3 / (GAS_J_KG_K * (mass - dt * lost))
+    values = np.array(seen) + NOISE_PA * random.standard_normal(len(seen))
+    return Recording(f"decay {seed}", SAMPLE_S, {PRESSURE: values}, noise={PRESSURE: NOISE_PA})
+
+
+@pytest.fixture(scope="module")
+def leaking():
+    """A decay of a minute through 2e-11 m2, and two shorter ones from other pressures."""
+    return [decay(s, k, p, area_m2=2e-11) for s, k, p in ((60, 1, 8e5), (40, 2, 6e5), (45, 3, 7e5))]
+
+
+def drive_recording(sample_time_s=1e-3, n=3000):
+    t = sample_time_s * np.arange(n)
+    channels = {
+        "valve.command_v": 5.0 + 2.0 * np.sin(7.0 * t),
+        "slide.position_m": 0.1 + 0.02 * np.sin(7.0 * t),
+        "chamber_a.pressure_pa": 4e5 + 1e5 * np.cos(7.0 * t),
+        "chamber_b.pressure_pa": 4e5 - 1e5 * np.cos(7.0 * t),
+    }
+    return Recording("drive", sample_time_s, channels)
+
+
+@pytest.mark.parametrize(("sample_time_s", "expected_s"), [(1e-3, 0.2), (1e-2, 0.2), (2e-2, 0.4)])
+def test_where_something_moves_windows_stay_short_with_twenty_samples_at_least(
+    sample_time_s, expected_s
+):
+    recorded = drive_recording(sample_time_s)
+    plant = default_rig("servo_drive").fit_for(recorded)
+
+    assert window_length_s(plant, [recorded]) == pytest.approx(expected_s)
+
+
+def test_a_decay_slower_than_its_recording_stays_whole_and_several_fit_the_shortest(leaking):
+    plant = chamber_decay.rig().plant.lean()
+
+    assert time_constant_s(plant, leaking) == np.inf
+    assert window_length_s(plant, leaking[:1]) == pytest.approx(60.0)
+    assert window_length_s(plant, leaking[:1], leaking[1:]) == pytest.approx(40.0)
+
+
+def filled(volume_m3):
+    """Pressure of a tank of this volume that a half-open valve fills, 20 s at 100 Hz."""
+    t = 0.01 * np.arange(2000)
+    pressure = 7e5 - 5.9e5 * np.exp(-t * 2e-3 / volume_m3)
+    channels = {"valve.command_v": np.full(2000, 9.0), "reservoir.pressure_pa": pressure}
+    return Recording("fill", 0.01, channels, noise={"reservoir.pressure_pa": 1e3})
+
+
+def test_a_tank_ten_times_as_large_has_windows_longer_in_proportion():
+    plant = PLANTS["servo_reservoir"]()
+    large = plant.with_values({"reservoir.volume_m3": 3.44e-3, "reservoir.surface_m2": 3.419e-1})
+    small_s, large_s = (
+        time_constant_s(each.lean(), [filled(v)])
+        for each, v in ((plant, 0.344e-3), (large, 3.44e-3))
+    )
+
+    assert 0.1 < small_s < 10.0
+    assert 4.0 < large_s / small_s < 25.0
+    assert window_length_s(plant.lean(), [filled(0.344e-3)]) == pytest.approx(20.0 / 25, rel=0.05)
+
+
+BALANCES = {
+    "closed_chamber": {"chamber.mass", "chamber.energy"},
+    "servo_reservoir": {"reservoir.mass", "reservoir.energy"},
+    "soft_joint": {"bellows.mass"},
+    "soft_joint_parametric": {"bellows.mass"},
+    "gearbox": {
+        *("main_piston.momentum", "floating_piston.momentum", "finger.momentum"),
+        *(f"{c}.{b}" for c in ("chamber_1", "chamber_2", "control_chamber")
+          for b in ("mass", "energy")),
+    },
+    "crr_leg": {
+        *(f"joint_{k}.momentum" for k in (1, 2, 3)),
+        *(
+            f"{chamber}_{k}.{balance}"
+            for chamber in ("cap", "rod_side")
+            for k in (1, 2, 3)
+            for balance in ("mass", "energy")
+        ),
+    },
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", BALANCES)
+def test_every_balance_of_a_plant_may_lack_a_flow(name):
+    _, flows = with_missing_flows(PLANTS[name]().lean())
+
+    assert {flow.place for flow in flows} == BALANCES[name]
+
+
+def test_a_missing_flow_acts_as_the_laws_of_gas_and_of_levers_say():
+    """kappa R T/V per kg/s, (kappa - 1)/V per W, and 1/J per N m."""
+    chamber, _ = with_missing_flows(PLANTS["closed_chamber"]().lean())
+    states = list(chamber.model.states)
+
+    def answer(plant, parameter, size):
+        given = plant.nominal[2].copy()
+        given[list(plant.model.parameters).index(parameter)] = size
+        return plant.model.f(plant.initial, *plant.nominal[:2], given)[0].full().ravel()
+
+    gas = answer(chamber, "missing@chamber.mass.flow", 1e-6)
+    heat = answer(chamber, "missing@chamber.energy.flow", 2.0)
+    pressure, mass = states.index(PRESSURE), states.index("chamber.mass_kg")
+    assert gas[pressure] == pytest.approx(1e-6 * 1.4 * GAS_J_KG_K * ROOM_K / VOLUME_M3, rel=1e-3)
+    assert gas[mass] == pytest.approx(1e-6)
+    assert heat[pressure] == pytest.approx(2.0 * 0.4 / VOLUME_M3)
+    assert heat[mass] == 0.0
+    gearbox, _ = with_missing_flows(PLANTS["gearbox"]().lean())
+    still = gearbox.model.f(gearbox.initial, *gearbox.nominal)[0].full().ravel()
+    turned = answer(gearbox, "missing@finger.momentum.flow", 0.3) - still
+    row = list(gearbox.model.states).index("finger.velocity_rad_s")
+    assert turned[row] == pytest.approx(0.3 / 1.5e-3)
+    assert display_unit("torque_n_m") == "N m"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Charge(Term):
+    """What a user's own part balances."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Store(Part):
+    """A user's own part: a level that a flow fills."""
+
+    @property
+    def balances(self):
+        return (
+            BalanceEquation(
+                balance=Balance.MASS,
+                kind=Charge,
+                term="volume_flow_m3_s",
+                state="level_m3",
+                rates=(1e-3, 1e-2),
+            ),
+        )
+
+    def states(self):
+        yield State("level_m3", 1.0, scale=1.0)
+
+    def rates(self, now, received):
+        return {"level_m3": sum(term.value for term in received(self.name)) / 2.0}
+
+
+def test_a_user_s_own_part_declares_its_balance():
+    plant = Plant(name="own", parts=(Store(name="tank"),), measured=("tank.level_m3",))
+    recorded = Recording("level", 0.1, {"tank.level_m3": np.linspace(1.0, 2.0, 100)})
+    whole, flows = with_missing_flows(plant)
+    windows = pose(
+        replace(default_rig("closed_chamber"), plant=plant),
+        [replace(recorded, noise={"tank.level_m3": 1e-3})],
+    ).base.windows
+    (found,) = suspects(whole, flows, recorded, pace_of(windows, whole))
+
+    assert found.balance == "tank.mass"
+    assert found.intensities == pytest.approx((2e-3, 2e-2))  # half of a flow is a rate
+    assert process_noise(whole, pace_of(windows, whole)) == {"tank.level_m3": pytest.approx(3e-4)}
+
+
+def test_the_missing_flow_of_a_leaking_chamber_is_found_in_kg_s(leaking):
+    problem = pose(chamber_decay.rig(), leaking[:1])
+    where = locate(problem, leaking[:1])
+    recorded = leaking[0][PRESSURE]
+    slope_pa_s = (recorded[-50:].mean() - recorded[:50].mean()) / 55.0
+    lost_kg_s = slope_pa_s * VOLUME_M3 / (1.4 * GAS_J_KG_K * ROOM_K)
+
+    assert where.balance == "chamber.mass"
+    assert where.term_name == "mass_flow_kg_s"
+    assert all(gain > 50.0 for gain in where.by_balance.values())
+    assert where.term.mean() == pytest.approx(lost_kg_s, rel=0.15)
+
+
+def test_the_walls_of_a_leak_and_of_cooling_are_a_tie_in_a_minute(leaking):
+    found = diagnose(chamber_decay.rig(), leaking[:2], leaking[2:])
+    leader = found.ranking[0]
+
+    assert found.verdict is Verdict.TIE
+    assert {leader.candidate.name, *leader.tied_with} == {"chamber_leak", "wall_heat"}
+    leak = next(row for row in found.ranking if row.candidate.name == "chamber_leak")
+    assert leak.size["chamber_leak.area_m2"].value == pytest.approx(2e-11, rel=0.1)
+
+
+def test_a_chamber_that_holds_its_gas_lacks_nothing():
+    tight = [decay(60, 11), decay(40, 12, 6e5)]
+    found = diagnose(chamber_decay.rig(), tight[:1], tight[1:])
+
+    assert found.verdict in (Verdict.NOTHING_MISSING, Verdict.SMALL_PROXY)
+    assert not any(row.accepted for row in found.ranking)
+
+
+@pytest.mark.slow
+def test_a_chamber_that_cools_within_seconds_has_no_leak():
+    """15 K above the wall with a time constant of 7 s: no hole empties a chamber like that."""
+    cooling = [decay(40, 21, warmer_k=3.0, heat_w_k=0.1), decay(30, 22, 6e5, 0.0, 3.0, 0.1)]
+    found = diagnose(chamber_decay.rig(), cooling[:1], cooling[1:])
+
+    assert found.ranking[0].candidate.name == "wall_heat"
+
+
+needs_data = pytest.mark.skipif(DATA is None, reason="the real recordings are not there")
+
+
+@needs_data
+@pytest.mark.slow
+@pytest.mark.parametrize("name", chamber_decay.CHAMBERS)
+def test_a_real_chamber_leaks_or_cools(name):
+    train, rest = chamber_decay.recordings(DATA, name)
+    found = diagnose(chamber_decay.rig(), [train], [rest])
+    leader = found.ranking[0]
+
+    assert found.verdict is Verdict.TIE
+    assert {leader.candidate.name, *leader.tied_with} == {"chamber_leak", "wall_heat"}
+    assert found.where.balance in ("chamber.mass", "chamber.energy")
