@@ -62,7 +62,8 @@ def flow_figure(found: FlowFit) -> Figure:
         axes.plot(command_v, rig, "s--", color=RED, markersize=2.5, label="the improved rig")
         axes.axhline(GOAL_BAR, color=BLACK, linestyle=":", label="paper 002")
         axes.set_ylabel("MAE (bar)")
-        axes.legend()
+        axes.set_ylim(0.0, 1.6 * max(*own, *rig, GOAL_BAR))
+        axes.legend(loc="upper center", ncols=3)
         for axes in panels[1]:
             axes.set_xlabel("command (V)")
     return figure
@@ -145,8 +146,9 @@ def dead_volume_figure(found: DeadVolumes) -> Figure:
             top = max(release.after_pa, float(np.max(measured))) / PA_PER_BAR
             axes.set_ylim(top - 0.15, top + 0.05)
             axes.set_ylabel(f"{release.chamber.replace('_', ' ')}\npressure (bar)")
-        panels[0].legend()
         panels[-1].set_xlabel("time (s)")
+        handles, labels = panels[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=len(handles))
     return figure
 
 

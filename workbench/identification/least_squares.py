@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 DIFFERENCE = 1e-3  # of the scale of an unknown: the integrator chooses its steps by the state
-ROOM = 1e-9  # beyond a bound: a start at the bound is inside
+ROOM = 0.1  # of the scale: a start stays that far inside its bounds
 MOST_EVALUATIONS = 60
 
 
@@ -63,10 +63,11 @@ def solve(
         x = start + scale * t
         return np.concatenate([residuals(x), known * (x - start)])
 
-    first = weighed(np.zeros(len(start)))
-    if not np.isfinite(first).all():
+    bounds = (lower - start) / scale, (upper - start) / scale
+    # From a bound itself the method creeps: it counts how far away the bound is.
+    begun = np.clip(0.0, bounds[0] + ROOM, np.maximum(bounds[1] - ROOM, bounds[0] + ROOM))
+    if not np.isfinite(weighed(begun)).all():
         raise ArithmeticError("the model is not finite at the rig's own values")
-    bounds = (lower - start) / scale - ROOM, (upper - start) / scale + ROOM
 
     def slopes(t: np.ndarray) -> np.ndarray:
         """Differences away from the nearer bound, over one step for all."""
@@ -79,10 +80,9 @@ def solve(
 
     found = least_squares(
         weighed,
-        np.zeros(len(start)),
+        begun,
         jac=slopes,
         bounds=bounds,
-        method="dogbox",  # the other one creeps away from a bound that it starts at
         max_nfev=MOST_EVALUATIONS,
     )
     left = found.fun[: len(found.fun) - len(start)]

@@ -125,7 +125,7 @@ def tank_curves(
         progress(f"curve {k} of {len(pieces)}, {piece.command_v:.2f} V")
         curves.append(_curve(plant, names, piece, noise))
     progress("all curves at once")
-    common = _common(plant, names, pieces, curves)
+    common = _common(rig, plant, names, pieces)
     ends = np.cumsum([len(piece.recording) for piece in pieces])[:-1]
     return FlowFit(
         rig=rig,
@@ -232,13 +232,18 @@ def _curve(plant: Plant, names: _Names, piece: _Piece, noise: float) -> TankCurv
     )
 
 
-def _common(plant: Plant, names: _Names, pieces: list[_Piece], curves: list[TankCurve]) -> Solution:
-    """The rig's own parameters, fitted to all curves at once with one dead time."""
+def _common(rig: Rig, plant: Plant, names: _Names, pieces: list[_Piece]) -> Solution:
+    """The rig's own parameters, fitted to all curves at once with one dead time.
+
+    The dead zone keeps what is known of it: curves every 0.2 V say less than a slow sweep.
+    """
     known, own, channel = plant.parameters, plant.values, plant.measured[0]
     scales = (0.05, 0.05, 0.1, 0.1, 0.1, 0.01, 0.05, 0.1, 0.1)
+    leans = [rig.standard_deviation(name) for name in names.common[:2]]
+    leans += [np.inf] * (len(scales) - len(leans))
     unknowns = [
-        Unknown(own[name], scale, known[name].lower, known[name].upper)
-        for name, scale in zip(names.common, scales, strict=True)
+        Unknown(own[name], scale, known[name].lower, known[name].upper, lean or np.inf)
+        for name, scale, lean in zip(names.common, scales, leans, strict=True)
     ]
     unknowns.append(Unknown(3e-3, 3e-3, 0.0, LONGEST_DEAD_TIME_S))
     runs = [outputs_under(plant, piece.recording, names.common) for piece in pieces]
