@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from studies.figures.style import GREY, PAGE_IN, new_figure, styled, thinned
-from studies.text import labelled
 from workbench.units import display_scale, display_unit, public_name
 
 if TYPE_CHECKING:
@@ -42,10 +41,12 @@ def next_recording_figure(found: NextRecording) -> Figure:
 
 
 def _draw_predicted(axes: Axes, found: NextRecording, name: str) -> None:
-    unit = display_scale(name)
+    per_si = display_scale(name)
     for rival, recording in found.predicted.items():
-        axes.plot(*thinned(recording.time_s, unit.from_si(recording[name])), label=rival)
-    axes.set_ylabel(labelled(name).replace(" ", "\n", 1) if name in found.noise else labelled(name))
+        axes.plot(*thinned(recording.time_s, per_si.from_si(recording[name])), label=rival)
+    part, _, quantity = public_name(name).replace("_", " ").partition(".")
+    unit = display_unit(name)
+    axes.set_ylabel(f"{part}\n{quantity}" + (f" ({unit})" if unit else ""))
 
 
 def _draw_apart(axes: Axes, found: NextRecording, name: str) -> None:
