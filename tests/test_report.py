@@ -156,8 +156,9 @@ def test_an_empirical_law_comes_with_its_range():
         "chamber_a.pressure": {"low": 3e5, "high": 6e5, "unit": "Pa"},
     }
     said = diagnosis_text(diagnosis(Verdict.NOT_IN_CATALOGUE, law=law), UNITS)
+    assert "law (empirical, not a physical effect)" in said
     assert (
-        "law: drop train 80.0 %, validation 70.0 %; "
+        "drop train 80.0 %, validation 70.0 %; "
         "seen for slide.velocity -0.5 m/s to 0.5 m/s, chamber_a.pressure 3 bar to 6 bar"
     ) in said
 
