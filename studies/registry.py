@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from studies import hidden_study
+from studies import hidden_study, identification_study
 from studies.study import Study
 
-STUDIES: dict[str, Study] = {study.name: study for study in (hidden_study.STUDY,)}
+STUDIES: dict[str, Study] = {
+    study.name: study for study in (hidden_study.STUDY, identification_study.STUDY)
+}
