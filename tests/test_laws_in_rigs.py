@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from commands import call
-from test_diagnosis import bench, nothing
+from test_diagnosis import AMBIENT_PA, bench, nothing
 
+from controllers.design_file import design, read_design, write_design
 from studies.documents import diagnosis_document
 from studies.improvement_text import improvement_text
 from studies.text_of_results import unit_names
@@ -21,6 +22,7 @@ from workbench.diagnosis.improvement import Change
 from workbench.diagnosis.result import Verdict
 from workbench.errors import InputError
 from workbench.fitting.fit import fit
+from workbench.reading.writer import write_recording
 from workbench.recording import Recording
 from workbench.rig import default_rig, load_rig
 from workbench.rig_laws import law_terms
@@ -200,3 +202,24 @@ def test_a_rig_with_a_law_simulates_and_has_modes(tmp_path):
     recording = Recording("up", 1e-3, {"valve.command_v": np.full(400, 6.5)})
     speeds = [simulate(each, recording)["slide.velocity_m_s"].max() for each in (lean, dragged)]
     assert speeds[1] < speeds[0]
+
+
+def test_a_design_on_a_plant_with_a_law_reads_back_with_it(tmp_path):
+    plant = load_rig(LAW_RIG).plant
+    write_design(design("pid", plant), tmp_path / "pid.toml")
+
+    assert read_design(tmp_path / "pid.toml").plant == plant
+
+
+def test_the_command_takes_a_whole_law_from_recordings(tmp_path):
+    (tmp_path / "rig.toml").write_text(BARE)
+    for seed, name in ((1, "train"), (2, "validation")):
+        recording = replace(curved(seed), noise={})
+        write_recording(recording, tmp_path / f"{name}.csv", ambient_pa=AMBIENT_PA)
+    train, held_out, out = (tmp_path / n for n in ("train.csv", "validation.csv", "rig2.toml"))
+    words = ("--fit", train, "--validate", held_out, "-o", out)
+    answer = call("add", tmp_path / "rig.toml", "law", *words, "-q")
+
+    assert answer.exit_code == 0, answer.output
+    assert f"{CURVED}: empirical, not a physical effect" in answer.stdout
+    assert load_rig(out).plant.values[f"{CURVED}.curved_n_m2"] == pytest.approx(6e3, rel=0.05)
