@@ -1,8 +1,8 @@
 """DESIGN.toml: what a controller was designed on and with, so that it can be built again.
 
-The file holds the plant's name, the values it had and the effects it lacked, the numbers of the
-specification, and, for people, the gains of each mode.  Modes and gains follow from the rest, so
-reading designs anew: a file cannot say one thing and do another.
+The file holds the plant's name, the values it had, the effects it lacked and the empirical terms it
+had, the numbers of the specification, and, for people, the gains of each mode.  Modes and gains
+follow from the rest, so reading designs anew: a file cannot say one thing and do another.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from workbench.contracts import Controller
 from workbench.errors import whole_file
 from workbench.plant import Plant
 from workbench.plant_files import as_it_came, plant_named, plant_text
+from workbench.rig_laws import laws_of, with_laws
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,7 @@ def read_design(path: Path) -> Design:
     try:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
         method, place = content["controller"], content["plant"]
-        plant = plant_named(place["name"], path.parent)
+        plant = with_laws(plant_named(place["name"], path.parent), place.get("laws", ()))
         plant = plant.without(*place["removed"]).with_values(place["values"])
         return design(method, plant, content["spec"])
     except tomllib.TOMLDecodeError as error:
@@ -93,7 +94,8 @@ def read_design(path: Path) -> Design:
 
 def _lines(found: Design, folder: Path) -> Iterator[str]:
     plant = found.plant
-    original = as_it_came(plant)
+    laws = [term.name for term in laws_of(plant)]
+    original = with_laws(as_it_came(plant), laws)
     had, has = ({e.name for e in p.effects} for p in (original, plant))
     extra = sorted(has - had)
     if extra:
@@ -103,6 +105,8 @@ def _lines(found: Design, folder: Path) -> Iterator[str]:
     yield "\n[plant]"
     yield f'name = "{plant_text(plant, folder)}"'
     yield f"removed = [{', '.join(repr(name) for name in sorted(had - has))}]"
+    if laws:
+        yield f"laws = [{', '.join(map(repr, laws))}]"
     yield "\n[plant.values]"
     for name, value in plant.values.items():
         if value != before[name]:

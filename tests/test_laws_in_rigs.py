@@ -8,19 +8,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from commands import call
-from test_diagnosis import bench, nothing
+from test_diagnosis import AMBIENT_PA, bench, nothing
 
+from controllers.design_file import design, read_design, write_design
 from studies.documents import diagnosis_document
 from studies.improvement_text import improvement_text
 from studies.text_of_results import unit_names
 from workbench.comparison import compare
 from workbench.comparison.run import run
 from workbench.diagnosis.addition import add, add_law
+from workbench.diagnosis.diagnose import diagnose
 from workbench.diagnosis.improve import improve
 from workbench.diagnosis.improvement import Change
 from workbench.diagnosis.result import Verdict
 from workbench.errors import InputError
 from workbench.fitting.fit import fit
+from workbench.reading.writer import write_recording
 from workbench.recording import Recording
 from workbench.rig import default_rig, load_rig
 from workbench.rig_laws import law_terms
@@ -62,8 +65,11 @@ def lawful(rig):
     return improve(rig, [curved(1), curved(3, 1e5)], [curved(2, 4e5)], law=True)
 
 
-def test_no_empirical_term_stands_in_a_ranking(lawful):
-    for diagnosis in lawful.diagnoses:
+def test_no_empirical_term_stands_in_a_ranking_also_where_the_rig_has_one(lawful):
+    again = diagnose(lawful.rig, [curved(1), curved(3, 1e5)], [curved(2, 4e5)])
+
+    assert again.verdict is Verdict.NOTHING_MISSING
+    for diagnosis in (*lawful.diagnoses, again):
         assert not any(row.candidate.name.startswith("law[") for row in diagnosis.ranking)
 
 
@@ -133,23 +139,22 @@ def test_a_law_can_be_added_by_name_and_as_a_whole(rig):
 
 
 def test_every_term_of_every_plant_acts_and_is_absent_at_null(plant):
-    rng = np.random.default_rng(5)
-    for name, term in law_terms(plant).items():
-        with_it = plant.with_effects(term)
-        (candidate,) = [c for c in with_it.candidates.values() if c.name == name]
-        known = with_it.parameters[candidate.strength]
-        x = plant.initial + plant.scale * rng.uniform(0.1, 0.5, len(plant.scale))
-        u, d, _ = plant.nominal
-        d = d + 0.01
-        bare, null = plant.model.f(x, u, d, plant.nominal[2]), with_it.model.f
-        strong = with_it.with_values({candidate.strength: known.typical})
-        for got, same in zip(bare, null(x, u, d, with_it.nominal[2]), strict=True):
-            assert np.array_equal(np.array(got), np.array(same)), name
-        changed = [
-            np.abs(np.array(a) - np.array(b)).max(initial=0.0)
-            for a, b in zip(bare, null(x, u, d, strong.nominal[2]), strict=True)
-        ]
-        assert max(changed) > 0.0, name
+    terms = law_terms(plant)
+    lawful = plant.with_effects(*terms.values())
+    x = plant.initial + plant.scale * np.random.default_rng(5).uniform(0.1, 0.5, len(plant.scale))
+    u, d, p = plant.nominal
+
+    def rates_and_outputs(values):
+        with_them = lawful.with_values(values).nominal[2]
+        return np.vstack([part.full() for part in lawful.model.f(x, u, d + 0.01, with_them)])
+
+    at_null = rates_and_outputs({})
+    bare = [part.full() for part in plant.model.f(x, u, d + 0.01, p)]
+    assert np.array_equal(at_null, np.vstack(bare))
+    for name in terms:
+        strength = lawful.candidates[name].strength
+        typical = lawful.parameters[strength].typical
+        assert not np.array_equal(rates_and_outputs({strength: typical}), at_null), name
 
 
 @pytest.mark.parametrize(
@@ -200,3 +205,24 @@ def test_a_rig_with_a_law_simulates_and_has_modes(tmp_path):
     recording = Recording("up", 1e-3, {"valve.command_v": np.full(400, 6.5)})
     speeds = [simulate(each, recording)["slide.velocity_m_s"].max() for each in (lean, dragged)]
     assert speeds[1] < speeds[0]
+
+
+def test_a_design_on_a_plant_with_a_law_reads_back_with_it(tmp_path):
+    plant = load_rig(LAW_RIG).plant
+    write_design(design("pid", plant), tmp_path / "pid.toml")
+
+    assert read_design(tmp_path / "pid.toml").plant == plant
+
+
+def test_the_command_takes_a_whole_law_from_recordings(tmp_path):
+    (tmp_path / "rig.toml").write_text(BARE)
+    for seed, name in ((1, "train"), (2, "validation")):
+        recording = replace(curved(seed), noise={})
+        write_recording(recording, tmp_path / f"{name}.csv", ambient_pa=AMBIENT_PA)
+    train, held_out, out = (tmp_path / n for n in ("train.csv", "validation.csv", "rig2.toml"))
+    words = ("--fit", train, "--validate", held_out, "-o", out)
+    answer = call("add", tmp_path / "rig.toml", "law", *words, "-q")
+
+    assert answer.exit_code == 0, answer.output
+    assert f"{CURVED}: empirical, not a physical effect" in answer.stdout
+    assert load_rig(out).plant.values[f"{CURVED}.curved_n_m2"] == pytest.approx(6e3, rel=0.05)
