@@ -20,7 +20,7 @@ def z(p_u, p_d):
     if p_u / p_d > THETA:
         return BETA * p_u
     rho = p_d / p_u
-    if rho > LAMINAR:
+    if rho > LAMINAR * (1 + 1e-12):
         return z(p_u, LAMINAR * p_u) * (1 - rho) / (1 - LAMINAR)
     return ALPHA * p_u * np.sqrt(rho ** (2 / K) - rho ** ((K + 1) / K))
 

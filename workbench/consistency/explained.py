@@ -31,6 +31,7 @@ from workbench.simulation import inputs
 MOST_PROBED = 16  # windows
 LEAST_SAMPLES = 20  # of a window
 MOVING = 10.0  # noise deviations of an output that moves in the windows
+ABSURD = 50.0  # typical sizes of a state: a start beyond takes for ever and explains nothing
 WORST = 1e3  # of what is unexplained; more, or no number at all, says no more
 
 
@@ -92,9 +93,12 @@ def _simulated(plant: Plant, readings: Sequence[Recording], where: Probe) -> np.
     u, d = (np.concatenate([each[k] for each in fed], axis=1) for k in (0, 1))
     u, d = (v.reshape(len(v), v.shape[1] * length) for v in (u, d))
     x0, count = np.hstack(starts), len(readings) * len(firsts)
+    absurd = (np.abs(x0) > ABSURD * (plant.scale + np.abs(plant.initial))[:, None]).any(axis=0)
+    x0 = np.where(absurd, plant.initial[:, None], x0)
     p = np.tile(plant.nominal[2][:, None], count)
     run = window_run(plant, dt, length).map(count)
     sent = run(x0, u, d, p).full().reshape(len(plant.measured), count, length)
+    sent[:, absurd] = np.nan
     return received_windows(plant, sent, (firsts,) * len(readings), dt)
 
 

@@ -31,7 +31,7 @@ FACTORS = {
     },
     "m": {10.0: f"{TEN} (cm for mm)", 1e3: f"{THOUSAND} (m for mm)", 25.4: "25.4 times (inches)"},
     "m_s": {10.0: TEN, 1e3: f"{THOUSAND} (m/s for mm/s)"},
-    "rad": {57.296: "57.3 times (rad for deg)"},
+    "rad": {10.0: TEN, 57.296: "57.3 times (rad for deg)"},
     "n": {10.0: TEN, 1e3: f"{THOUSAND} (kN for N)"},
 }
 ANY = {10.0: TEN, 1e3: THOUSAND}

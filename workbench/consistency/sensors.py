@@ -4,6 +4,7 @@ Noise      A signal with any motion in it is smoother than white noise: the thir
            white noise have 20 times its variance, those of a motion next to none.
 Stuck      Equal to the last bit for a while, in a channel that otherwise changes from sample to
            sample, while the plant says that it moves.
+Stops      No body gets through them.
 Clock      A sample taken delta late reads y + delta dy/dt: noise that grows with the slope, by the
            same delta in every channel that is fine enough to show it.
 """
@@ -16,6 +17,7 @@ import numpy as np
 
 from workbench.consistency.explained import MOVING, Probe, predicted_motion
 from workbench.consistency.findings import Finding, Weight
+from workbench.effects.forces import EndStops
 from workbench.fitting.noise import THIRD_DIFFERENCE_GAIN, measured_noise
 from workbench.fitting.window_cuts import evenly
 from workbench.plant import Plant
@@ -24,6 +26,7 @@ from workbench.recording import Recording
 from workbench.units import display_unit, public_name, scale
 
 WHITE = 0.8  # of a channel's standard deviation is that of white noise
+OUTSIDE = 0.2  # of the stroke: a position that far beyond a stop cannot be
 LEAST_STUCK = 0.02  # of a recording
 LOOKED_AT = 8  # windows of a stretch in which a sensor may be stuck
 UNEVEN = 0.1  # of a sample: a clock that ticks as unevenly as that is worth a word
@@ -59,6 +62,22 @@ def _white_share(recording: Recording, name: str) -> float:
     third = [np.diff(piece[name], 3) for piece in recording.pieces]
     third_rms = np.sqrt(np.nanmean(np.concatenate(third) ** 2)) if len(third) else 0.0
     return float(third_rms / np.sqrt(THIRD_DIFFERENCE_GAIN)) / max(spread, 1e-300)
+
+
+def beyond_stops(plant: Plant, recording: Recording) -> list[Finding]:
+    """Positions that the stops do not allow."""
+    found = []
+    for stops in (effect for effect in plant.effects if isinstance(effect, EndStops)):
+        name, low_m, high_m = f"{stops.body}.position_m", stops.lower_m, stops.upper_m
+        if name not in plant.measured:
+            continue
+        least_m, most_m = np.nanmin(recording[name]), np.nanmax(recording[name])
+        if max(low_m - least_m, most_m - high_m) > OUTSIDE * (high_m - low_m):
+            what = f"moves from {least_m:.4g} to {most_m:.4g} m, between stops at {low_m:.4g} and "
+            what += f"{high_m:.4g} m"
+            remedy = "another unit, sign or zero, or other stops in [values]"
+            found.append(_finding(Weight.REFUSED, recording, name, what, remedy))
+    return found
 
 
 def stuck(plant: Plant, recording: Recording) -> tuple[Recording, list[Finding]]:
@@ -114,7 +133,7 @@ def uneven_clock(plant: Plant, recording: Recording) -> list[Finding]:
 def _jitter(recording: Recording, name: str) -> tuple[float, float]:
     """Standard deviation of the sampling instant in samples, and the finest that would show."""
     try:
-        noise = measured_noise([recording], [name])[name]
+        noise = measured_noise([replace(recording, noise={})], [name])[name]
     except ValueError:
         return 0.0, np.inf
     third, slope = [], []
