@@ -9,11 +9,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
+from workbench.balances import BalanceEquation
 from workbench.diagnosis.diagnose import diagnose
 from workbench.diagnosis.result import Verdict
 from workbench.diagnosis.suspects import suspects, wandering, with_missing_flows
 from workbench.diagnosis.where import locate
-from workbench.effect import Balance, BalanceEquation, Part, State, Term
+from workbench.effect import Balance, Part, State, Term
 from workbench.fitting.problem import pose
 from workbench.fitting.window_length import time_constant_s, window_length_s
 from workbench.plant import Plant
@@ -170,17 +171,15 @@ class Charge(Term):
 class Store(Part):
     """A user's own part: a level that a flow fills."""
 
-    @property
-    def balances(self):
-        return (
-            BalanceEquation(
-                balance=Balance.MASS,
-                kind=Charge,
-                term="volume_flow_m3_s",
-                state="level_m3",
-                rates=(1e-3, 1e-2),
-            ),
-        )
+    balances = (
+        BalanceEquation(
+            balance=Balance.MASS,
+            kind=Charge,
+            term="volume_flow_m3_s",
+            state="level_m3",
+            rates=(1e-3, 1e-2),
+        ),
+    )
 
     def states(self):
         yield State("level_m3", 1.0, scale=1.0)

@@ -24,10 +24,13 @@ from dataclasses import dataclass, field, fields
 from enum import Enum
 from math import inf, isfinite
 from types import SimpleNamespace
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import casadi as ca
 import numpy as np
+
+if TYPE_CHECKING:
+    from workbench.balances import BalanceEquation
 
 Expression = float | ca.SX
 
@@ -56,11 +59,6 @@ class Term:
     balance: str
     value: Expression
 
-    @classmethod
-    def of(cls, part: str, value: Expression, now: Conditions) -> Term:
-        """A term of this kind of which only the value is known."""
-        return cls(part, value)
-
 
 class Force(Term):
     """A force on a body in N, positive towards growing position."""
@@ -83,11 +81,6 @@ class MassFlow(Term):
     """Gas entering a balance, in kg/s, with the temperature it brings along."""
 
     temperature_k: Expression
-
-    @classmethod
-    def of(cls, part: str, value: Expression, now: Conditions) -> MassFlow:
-        """Gas at the temperature of the part."""
-        return cls(part, value, now[part].temperature_k)
 
 
 Received = Callable[[str], list[Term]]  # the terms that a balance received, by its name
@@ -143,25 +136,6 @@ class Balance(Enum):
     SUPPLY = "supply"
     SENSOR = "sensor"
     TIMING = "timing"
-
-
-@dataclass(frozen=True, kw_only=True)
-class BalanceEquation:
-    """One balance that a part keeps, for the search of where a model fails.
-
-    balance     what is balanced
-    kind        the flows that it takes; a part's own subclass of :class:`Term` will do
-    term        a missing flow by name with its unit, ``force_n``
-    state       own state whose rate the flows drive
-    rates       smaller and larger size of what may be missing in that rate per square root of a
-                second, in the state's unit: a walk so fast is told from noise, and not from a kink
-    """
-
-    balance: Balance
-    kind: type[Term]
-    term: str
-    state: str
-    rates: tuple[float, float]
 
 
 class Kind(Enum):
@@ -313,12 +287,9 @@ class Effect:
 
 
 class Part(Effect):
-    """A part owns a balance: it collects the flows that others put in."""
+    """A part owns balances: it collects the flows that others put in."""
 
-    @property
-    def balances(self) -> tuple[BalanceEquation, ...]:
-        """What it balances; see :class:`BalanceEquation`."""
-        return ()
+    balances: ClassVar[tuple[BalanceEquation, ...]] = ()
 
     def derive(self, now: Conditions) -> dict[str, Expression]:
         """Quantities that follow from the states at once, for example a volume."""

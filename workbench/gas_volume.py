@@ -16,9 +16,9 @@ from workbench.air import (
     LOWEST_PRESSURE_PA,
     LOWEST_TEMPERATURE_K,
 )
+from workbench.balances import BalanceEquation
 from workbench.effect import (
     Balance,
-    BalanceEquation,
     Conditions,
     Expression,
     HeatFlow,

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
+from workbench.balances import BalanceEquation
 from workbench.effect import (
-    BalanceEquation,
     Conditions,
     Effect,
     Expression,
@@ -47,7 +47,7 @@ class MissingFlow(Effect):
     flow: Expression = strength(typical=1.0, lower=-np.inf)
 
     def terms(self, now: Conditions) -> Iterator[Term]:
-        yield self.equation.kind.of(self.part, self.flow, now)
+        yield self.equation.missing(self.part, self.flow, now)
 
 
 @dataclass(frozen=True)
