@@ -9,14 +9,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
+from workbench.balances import BalanceEquation
 from workbench.diagnosis.diagnose import diagnose
 from workbench.diagnosis.result import Verdict
-from workbench.diagnosis.suspects import pace_of, process_noise, suspects, with_missing_flows
+from workbench.diagnosis.suspects import suspects, wandering, with_missing_flows
 from workbench.diagnosis.where import locate
-from workbench.effect import Balance, State, Term
+from workbench.effect import Balance, Part, State, Term
 from workbench.fitting.problem import pose
 from workbench.fitting.window_length import time_constant_s, window_length_s
-from workbench.part import BalanceEquation, Part
 from workbench.plant import Plant
 from workbench.plants import PLANTS
 from workbench.recording import Recording
@@ -24,7 +24,7 @@ from workbench.recordings import chamber_decay, real_data_folder
 from workbench.rig import default_rig
 from workbench.units import display_unit
 
-PRESSURE = "chamber.pressure_pa"
+PRESSURE, LEVEL = "chamber.pressure_pa", "tank.level_m3"
 DATA = real_data_folder()
 GAMMA, GAS_J_KG_K, ROOM_K = 1.4, 287.05, 293.15
 VOLUME_M3, SURFACE_M2 = 1e-4, 1.3e-2  # those that the plant takes for granted
@@ -84,25 +84,32 @@ def test_a_decay_slower_than_its_recording_stays_whole_and_several_fit_the_short
     assert window_length_s(plant, leaking[:1], leaking[1:]) == pytest.approx(40.0)
 
 
-def filled(volume_m3):
-    """Pressure of a tank of this volume that a half-open valve fills, 20 s at 100 Hz."""
-    t = 0.01 * np.arange(2000)
-    pressure = 7e5 - 5.9e5 * np.exp(-t * 2e-3 / volume_m3)
-    channels = {"valve.command_v": np.full(2000, 9.0), "reservoir.pressure_pa": pressure}
-    return Recording("fill", 0.01, channels, noise={"reservoir.pressure_pa": 1e3})
+@dataclass(frozen=True, kw_only=True)
+class Vented(Part):
+    """A user's own part: a pressure that goes to nothing with one time constant."""
+
+    time_constant_s: float
+
+    def states(self):
+        yield State("pressure_pa", 1e5, scale=1e5)
+
+    def rates(self, now, received):
+        return {"pressure_pa": -now[self.name].pressure_pa / self.time_constant_s}
 
 
-def test_a_tank_ten_times_as_large_has_windows_longer_in_proportion():
-    plant = PLANTS["servo_reservoir"]()
-    large = plant.with_values({"reservoir.volume_m3": 3.44e-3, "reservoir.surface_m2": 3.419e-1})
-    small_s, large_s = (
-        time_constant_s(each.lean(), [filled(v)])
-        for each, v in ((plant, 0.344e-3), (large, 3.44e-3))
-    )
+@pytest.mark.parametrize(
+    ("time_constant", "expected_s"),
+    [(0.05, 0.2), (0.1, 0.3), (2.0, 10 / 24), (4.0, 10.0)],
+    ids=["twenty samples", "three time constants", "a 24th of the training", "the whole"],
+)
+def test_where_nothing_moves_windows_follow_the_time_constant(time_constant, expected_s):
+    part = Vented(name="tank", time_constant_s=time_constant)
+    plant = Plant(name="vented", parts=(part,), measured=("tank.pressure_pa",))
+    falling = 1e5 * np.exp(-0.01 * np.arange(1000) / time_constant)
+    recorded = Recording("vented", 0.01, {"tank.pressure_pa": falling})
 
-    assert 0.1 < small_s < 10.0
-    assert 4.0 < large_s / small_s < 25.0
-    assert window_length_s(plant.lean(), [filled(0.344e-3)]) == pytest.approx(20.0 / 25, rel=0.05)
+    assert time_constant_s(plant, [recorded]) == pytest.approx(time_constant)
+    assert window_length_s(plant, [recorded]) == pytest.approx(expected_s, rel=0.05)
 
 
 BALANCES = {
@@ -117,12 +124,8 @@ BALANCES = {
     },
     "crr_leg": {
         *(f"joint_{k}.momentum" for k in (1, 2, 3)),
-        *(
-            f"{chamber}_{k}.{balance}"
-            for chamber in ("cap", "rod_side")
-            for k in (1, 2, 3)
-            for balance in ("mass", "energy")
-        ),
+        *(f"{c}_{k}.{b}" for c in ("cap", "rod_side") for k in (1, 2, 3)
+          for b in ("mass", "energy")),
     },
 }  # fmt: skip
 
@@ -168,17 +171,15 @@ class Charge(Term):
 class Store(Part):
     """A user's own part: a level that a flow fills."""
 
-    @property
-    def balances(self):
-        return (
-            BalanceEquation(
-                balance=Balance.MASS,
-                kind=Charge,
-                term="volume_flow_m3_s",
-                state="level_m3",
-                rates=(1e-3, 1e-2),
-            ),
-        )
+    balances = (
+        BalanceEquation(
+            balance=Balance.MASS,
+            kind=Charge,
+            term="volume_flow_m3_s",
+            state="level_m3",
+            rates=(1e-3, 1e-2),
+        ),
+    )
 
     def states(self):
         yield State("level_m3", 1.0, scale=1.0)
@@ -188,18 +189,18 @@ class Store(Part):
 
 
 def test_a_user_s_own_part_declares_its_balance():
-    plant = Plant(name="own", parts=(Store(name="tank"),), measured=("tank.level_m3",))
-    recorded = Recording("level", 0.1, {"tank.level_m3": np.linspace(1.0, 2.0, 100)})
+    plant = Plant(name="own", parts=(Store(name="tank"),), measured=(LEVEL,))
+    recorded = Recording("level", 0.1, {LEVEL: np.linspace(1.0, 2.0, 100)})
     whole, flows = with_missing_flows(plant)
-    windows = pose(
-        replace(default_rig("closed_chamber"), plant=plant),
-        [replace(recorded, noise={"tank.level_m3": 1e-3})],
-    ).base.windows
-    (found,) = suspects(whole, flows, recorded, pace_of(windows, whole))
+    rig = replace(default_rig("closed_chamber"), plant=plant)
+    problem = pose(rig, [replace(recorded, noise={LEVEL: 1e-3})])
+    astray = wandering(whole, problem.base.windows)
+    (found,) = suspects(whole, flows, recorded, astray)
+    where = locate(problem, [recorded])
 
-    assert found.balance == "tank.mass"
-    assert found.intensities == pytest.approx((2e-3, 2e-2))  # half of a flow is a rate
-    assert process_noise(whole, pace_of(windows, whole)) == {"tank.level_m3": pytest.approx(3e-4)}
+    assert found.balance == where.balance == "tank.mass"
+    assert np.array(found.intensities) == pytest.approx(2.0 * np.array(astray.rates[LEVEL]))
+    assert where.term.mean() == pytest.approx(2.0 * 1.0 / 9.9, rel=0.1)  # half of a flow is a rate
 
 
 def test_the_missing_flow_of_a_leaking_chamber_is_found_in_kg_s(leaking):

@@ -24,10 +24,13 @@ from dataclasses import dataclass, field, fields
 from enum import Enum
 from math import inf, isfinite
 from types import SimpleNamespace
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import casadi as ca
 import numpy as np
+
+if TYPE_CHECKING:
+    from workbench.balances import BalanceEquation
 
 Expression = float | ca.SX
 
@@ -56,11 +59,6 @@ class Term:
     balance: str
     value: Expression
 
-    @classmethod
-    def of(cls, part: str, value: Expression, now: Conditions) -> Term:
-        """A term of this kind of which only the value is known."""
-        return cls(part, value)
-
 
 class Force(Term):
     """A force on a body in N, positive towards growing position."""
@@ -87,11 +85,6 @@ class MassFlow(Term):
 
     temperature_k: Expression
     choked_share: Expression | None = None
-
-    @classmethod
-    def of(cls, part: str, value: Expression, now: Conditions) -> MassFlow:
-        """Gas at the temperature of the part."""
-        return cls(part, value, now[part].temperature_k)
 
 
 Received = Callable[[str], list[Term]]  # the terms that a balance received, by its name
@@ -150,14 +143,10 @@ class Balance(Enum):
 
 
 class Kind(Enum):
-    """How a cause is scored.
+    """How a cause is scored."""
 
-    EFFECT       a term that the model lacks
-    PARAMETER    a shift of a parameter that the prior fit may move (``held``)
-    """
-
-    EFFECT = "effect"
-    PARAMETER = "parameter"
+    EFFECT = "effect"  # a term that the model lacks
+    PARAMETER = "parameter"  # a shift of a parameter that the prior fit may move (``held``)
 
 
 ONE_SIDED = (0.03, 0.1, 0.3, 0.8)
@@ -295,3 +284,17 @@ class Effect:
     def resample(self, channel: str, values: np.ndarray, sample_time_s: float) -> np.ndarray:
         """The sampled command sequence as this effect hands it on, shape (n,): delay, pause."""
         return values
+
+
+class Part(Effect):
+    """A part owns balances: it collects the flows that others put in."""
+
+    balances: ClassVar[tuple[BalanceEquation, ...]] = ()
+
+    def derive(self, now: Conditions) -> dict[str, Expression]:
+        """Quantities that follow from the states at once, for example a volume."""
+        return {}
+
+    def close(self, now: Conditions, received: Received) -> dict[str, Expression]:
+        """Quantities that follow from what was received, for example a held rod's force."""
+        return {}

@@ -16,17 +16,18 @@ from workbench.air import (
     LOWEST_PRESSURE_PA,
     LOWEST_TEMPERATURE_K,
 )
+from workbench.balances import BalanceEquation
 from workbench.effect import (
     Balance,
     Conditions,
     Expression,
     HeatFlow,
     MassFlow,
+    Part,
     Received,
     State,
     Term,
 )
-from workbench.part import BalanceEquation, Part
 
 LOWEST_MASS_KG = 1e-9
 PRESSURE_RATES = (1e5, 1e6)

@@ -13,8 +13,17 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from workbench.effect import Balance, Cause, Conditions, Expression, Kind, Received, form, strength
-from workbench.part import Part
+from workbench.effect import (
+    Balance,
+    Cause,
+    Conditions,
+    Expression,
+    Kind,
+    Part,
+    Received,
+    form,
+    strength,
+)
 
 JOINTS = 3
 INCH_M = 0.0254

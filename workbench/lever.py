@@ -7,9 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from workbench.effect import Conditions, Expression, Received, State, Torque, form
+from workbench.effect import (
+    Conditions,
+    Expression,
+    Part,
+    Received,
+    State,
+    Torque,
+    form,
+)
 from workbench.linkage import TURNING
-from workbench.part import BalanceEquation, Part
 from workbench.parts import total
 
 
@@ -22,15 +29,13 @@ class Lever(Part):
     Source: paper 003 (shift finger); physics.md 2.5.
     """
 
+    balances = (TURNING,)
+
     tip_body: str
 
     inertia_kg_m2: Expression = form(1e-3, lower=1e-8, relative_deviation=0.05)
     arm_m: Expression = form(0.05, lower=1e-3)
     initial_angle_rad: float = 0.0
-
-    @property
-    def balances(self) -> tuple[BalanceEquation, ...]:
-        return (TURNING,)
 
     def states(self) -> Iterator[State]:
         yield State("angle_rad", self.initial_angle_rad, scale=0.2, tolerance=2e-6)

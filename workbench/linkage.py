@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
+from workbench.balances import BalanceEquation
 from workbench.effect import (
     Balance,
     Cause,
@@ -21,13 +22,13 @@ from workbench.effect import (
     Expression,
     Force,
     Kind,
+    Part,
     Received,
     State,
     Torque,
     form,
     strength,
 )
-from workbench.part import BalanceEquation, Part
 from workbench.parts import total
 
 TURNING = BalanceEquation(
@@ -50,13 +51,11 @@ class Joint(Part):
     geometry); physics.md 2.2.
     """
 
+    balances = (TURNING,)
+
     rod: str
     linkage: str
     initial_angle_rad: float = 0.0
-
-    @property
-    def balances(self) -> tuple[BalanceEquation, ...]:
-        return (TURNING,)
 
     def states(self) -> Iterator[State]:
         yield State("angle_rad", self.initial_angle_rad, scale=1.0, tolerance=5e-7)
@@ -93,10 +92,6 @@ class HeldJoint(Joint):
     """
 
     linkage: str = ""
-
-    @property
-    def balances(self) -> tuple[BalanceEquation, ...]:
-        return ()
 
     def states(self) -> Iterator[State]:
         return iter(())

@@ -9,6 +9,7 @@ from math import pi
 import casadi as ca
 import numpy as np
 
+from workbench.balances import BalanceEquation
 from workbench.effect import (
     AddedMass,
     Balance,
@@ -17,6 +18,7 @@ from workbench.effect import (
     Expression,
     Force,
     Kind,
+    Part,
     Received,
     State,
     Term,
@@ -24,7 +26,6 @@ from workbench.effect import (
     strength,
 )
 from workbench.gas_volume import GasVolume, total
-from workbench.part import BalanceEquation, Part
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,6 +76,15 @@ class Body(Part):
             source="physics.md section 6 (payload)",
         ),
     )
+    balances = (
+        BalanceEquation(
+            balance=Balance.MOMENTUM,
+            kind=Force,
+            term="force_n",
+            state="velocity_m_s",
+            rates=(1.0, 5.0),
+        ),
+    )
 
     mass_kg: Expression = form(1.0, lower=1e-3, relative_deviation=0.05)
     added_mass_kg: Expression = strength(typical=1.0, lower=-1.0, upper=5.0)
@@ -82,18 +92,6 @@ class Body(Part):
     initial_position_m: float = 0.0
     travel_m: float = 0.1
     step_error_m: float = 2e-8
-
-    @property
-    def balances(self) -> tuple[BalanceEquation, ...]:
-        return (
-            BalanceEquation(
-                balance=Balance.MOMENTUM,
-                kind=Force,
-                term="force_n",
-                state="velocity_m_s",
-                rates=(1.0, 5.0),
-            ),
-        )
 
     def states(self) -> Iterator[State]:
         yield State("position_m", self.initial_position_m, self.travel_m, self.step_error_m)

@@ -13,9 +13,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from workbench.effect import Cause, Conditions, Effect, Expression, Parameter, State, Term
+from workbench.effect import Cause, Conditions, Effect, Expression, Parameter, Part, State, Term
 from workbench.model import Model, flow_paths
-from workbench.part import Part
 
 
 @dataclass(frozen=True)

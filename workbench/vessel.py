@@ -8,12 +8,14 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
+from workbench.balances import BalanceEquation
 from workbench.effect import (
     Balance,
     Cause,
     Conditions,
     Expression,
     Kind,
+    Part,
     Received,
     State,
     Term,
@@ -21,7 +23,6 @@ from workbench.effect import (
     strength,
 )
 from workbench.gas_volume import PRESSURE_RATES, GasVolume, total
-from workbench.part import BalanceEquation, Part
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,19 +106,17 @@ class LumpedPressure(Part):
     Source: paper 004 Eqs. 5 and 6 (erratum E004-4: P and p are one pressure).
     """
 
-    initial_pressure_pa: float = 1.013e5
+    balances = (
+        BalanceEquation(
+            balance=Balance.MASS,
+            kind=PressureRate,
+            term="pressure_rate_pa_s",
+            state="pressure_pa",
+            rates=PRESSURE_RATES,
+        ),
+    )
 
-    @property
-    def balances(self) -> tuple[BalanceEquation, ...]:
-        return (
-            BalanceEquation(
-                balance=Balance.MASS,
-                kind=PressureRate,
-                term="pressure_rate_pa_s",
-                state="pressure_pa",
-                rates=PRESSURE_RATES,
-            ),
-        )
+    initial_pressure_pa: float = 1.013e5
 
     def states(self) -> Iterator[State]:
         yield State("pressure_pa", self.initial_pressure_pa, scale=1e5, tolerance=20.0)

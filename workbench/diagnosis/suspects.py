@@ -1,6 +1,6 @@
 """The balances that may lack a flow, and a filter in which each may have an unknown one.
 
-Every part declares what it balances (:attr:`workbench.part.Part.balances`).  Here each balance
+Every part declares what it balances (:attr:`workbench.effect.Part.balances`).  Here each balance
 gets a term of unknown size, a parameter that the filter lets wander: a missing force stands in N,
 a missing flow in kg/s, a missing heat in W, whatever state rates it drives by the part's equations.
 
@@ -15,17 +15,26 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from workbench.effect import Conditions, Effect, Expression, Term, strength
+from workbench.balances import BalanceEquation
+from workbench.effect import (
+    Conditions,
+    Effect,
+    Expression,
+    State,
+    Term,
+    strength,
+)
 from workbench.fitting.starts import guessed_states
+from workbench.fitting.window_length import moves
 from workbench.fitting.windows import Windows
-from workbench.part import BalanceEquation
 from workbench.plant import Plant
 from workbench.recording import Recording
 from workbench.simulation import inputs
 
 PROCESS_SHARE = 0.3  # of the smaller size of a missing rate: what no model is without
 MASS_SHARE = 0.01  # of the scale of a mass of gas, which nobody measures
-SLOW = 0.1  # of that size: where a recording changes less in a second, its own pace counts
+RECORDED_SHARES = (0.01, 0.1, 1.0, 10.0)  # of a recorded rate, to be sought where nothing moves
+MASS = "mass_kg"
 POINTS = 50  # of a recording at which flows are turned into rates
 
 
@@ -38,7 +47,7 @@ class MissingFlow(Effect):
     flow: Expression = strength(typical=1.0, lower=-np.inf)
 
     def terms(self, now: Conditions) -> Iterator[Term]:
-        yield self.equation.kind.of(self.part, self.flow, now)
+        yield self.equation.missing(self.part, self.flow, now)
 
 
 @dataclass(frozen=True)
@@ -71,7 +80,7 @@ def with_missing_flows(plant: Plant) -> tuple[Plant, tuple[MissingFlow, ...]]:
 
 
 def suspects(
-    plant: Plant, flows: Sequence[MissingFlow], recording: Recording, pace: Pace
+    plant: Plant, flows: Sequence[MissingFlow], recording: Recording, astray: Wandering
 ) -> list[Suspect]:
     """One for each flow, with intensities in its own unit.
 
@@ -79,20 +88,18 @@ def suspects(
     must be for a rate of one, which is the median over the recording (m for a force, V/(k R T) for
     a mass flow).  Where it moves nothing, there is nothing to suspect.
     """
-    found = []
-    for flow, answer in zip(flows, _answers(plant, flows, recording), strict=True):
-        if answer <= 0.0:
-            continue
-        wandering = pace.wandering(f"{flow.part}.{flow.equation.state}")
-        found.append(
-            Suspect(
-                balance=flow.place or "",
-                term=flow.equation.term,
-                parameter=f"{flow.name}.flow",
-                intensities=tuple(wandering * rate / answer for rate in flow.equation.rates),
-            )
+    return [
+        Suspect(
+            balance=flow.place or "",
+            term=flow.equation.term,
+            parameter=f"{flow.name}.flow",
+            intensities=tuple(
+                rate / answer for rate in astray.rates[f"{flow.part}.{flow.equation.state}"]
+            ),
         )
-    return found
+        for flow, answer in zip(flows, _answers(plant, flows, recording), strict=True)
+        if answer > 0.0
+    ]
 
 
 def _answers(plant: Plant, flows: Sequence[MissingFlow], recording: Recording) -> list[float]:
@@ -113,52 +120,47 @@ def _answers(plant: Plant, flows: Sequence[MissingFlow], recording: Recording) -
 
 
 @dataclass(frozen=True)
-class Pace:
-    """How slow recorded states are against what their balances take for small.
+class Wandering:
+    """How fast states go astray, by name: what the filter takes for possible.
 
-    shares     rate as recorded over the smaller rate of the balance, by state; a state that
-               changes at least a tenth as fast as that does not stand here, and counts 1
-    window_s   time over which slow states are seen to change
+    rates      sizes of a missing rate per square root of a second that are tried
+    process    standard deviation that a state gains per square root of a second in any model
     """
 
-    shares: Mapping[str, float]
-    window_s: float
-
-    def wandering(self, state: str) -> float:
-        """Factor on a missing rate's intensity: a slow one takes a window to become as large."""
-        return self.shares[state] / np.sqrt(self.window_s) if state in self.shares else 1.0
+    rates: Mapping[str, tuple[float, ...]]
+    process: Mapping[str, float]
 
 
-def pace_of(windows: Windows, plant: Plant) -> Pace:
-    """The pace of a recording; a rate is the slope that gives the spread seen in the windows."""
+def wandering(plant: Plant, windows: Windows) -> Wandering:
+    """As the balances declare it; where nothing moves, as fast as the recording shows.
+
+    What moves is much alike from one drive to the next.  A vessel fills in a tenth of a second or
+    loses its gas in hours: there a missing rate is sought from a hundredth of the recorded one to
+    ten times that, as what it may become within a window, and in a window the model may go astray
+    by the sensor's noise.
+    """
+    rates = {f"{p.name}.{e.state}": e.rates for p in plant.parts for e in p.balances}
+    process = {name: PROCESS_SHARE * rates[name][0] for name in plant.state_list if name in rates}
+    masses = {name: MASS_SHARE * s.scale for name, s in _masses(plant).items()}
+    if not moves(plant):
+        root_s = np.sqrt(windows.length * windows.recordings[0].sample_time_s)
+        noise = dict(zip(windows.plant.measured, windows.noise, strict=True))
+        for name, rate in _recorded_rates(windows).items():
+            if name in rates and rate > 0.0:
+                rates[name] = tuple(share * rate / root_s for share in RECORDED_SHARES)
+                slower = noise[name] / root_s / process[name]
+                process[name] *= slower
+                mass = name.replace("pressure_pa", MASS)
+                masses |= {mass: slower * masses[mass]} if mass in masses else {}
+    return Wandering(rates, process | masses)
+
+
+def _recorded_rates(windows: Windows) -> dict[str, float]:
+    """How fast each output changes: the slope that gives the spread seen in the windows."""
+    spread = np.sqrt(12.0 * np.mean(windows.activity**2, axis=1))
     length_s = windows.length * windows.recordings[0].sample_time_s
-    spread = np.sqrt(np.mean(windows.activity**2, axis=1))
-    recorded = dict(zip(windows.plant.measured, np.sqrt(12.0) * spread / length_s, strict=True))
-    shares = {
-        name: recorded[name] / rate
-        for name, rate in _smaller_rates(plant).items()
-        if 0.0 < recorded.get(name, 0.0) < SLOW * rate
-    }
-    return Pace(shares, length_s)
+    return dict(zip(windows.plant.measured, (spread / length_s).tolist(), strict=True))
 
 
-def _smaller_rates(plant: Plant) -> dict[str, float]:
-    """The smaller size of what a rate may lack, by state."""
-    return {
-        f"{part.name}.{equation.state}": equation.rates[0]
-        for part in plant.parts
-        for equation in part.balances
-    }
-
-
-def process_noise(plant: Plant, pace: Pace) -> dict[str, float]:
-    """Standard deviation that each state gains per square root of a second in any model."""
-    rates, found = _smaller_rates(plant), {}
-    for name, state in plant.state_list.items():
-        part, _, quantity = name.rpartition(".")
-        if name in rates:
-            found[name] = PROCESS_SHARE * pace.shares.get(name, 1.0) * rates[name]
-        elif quantity == "mass_kg":
-            share = pace.shares.get(f"{part}.pressure_pa", 1.0)
-            found[name] = MASS_SHARE * share * state.scale
-    return found
+def _masses(plant: Plant) -> dict[str, State]:
+    return {name: s for name, s in plant.state_list.items() if name.endswith(f".{MASS}")}

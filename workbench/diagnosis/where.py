@@ -19,13 +19,7 @@ import numpy as np
 
 from workbench.comparison.regimes import regime_shares
 from workbench.diagnosis.result import Dependence, Where
-from workbench.diagnosis.suspects import (
-    Suspect,
-    pace_of,
-    process_noise,
-    suspects,
-    with_missing_flows,
-)
+from workbench.diagnosis.suspects import Suspect, suspects, wandering, with_missing_flows
 from workbench.effect import Balance
 from workbench.filtering import FilterResult, log_likelihoods, recording_filter, smooth
 from workbench.fitting.problem import Problem
@@ -48,16 +42,15 @@ def locate(problem: Problem, recordings: Sequence[Recording]) -> Where | None:
     """
     plant, flows = with_missing_flows(problem.whole.lean())
     windows, recording = problem.base.windows, recordings[0]
-    pace = pace_of(windows, plant)
-    suspected = suspects(plant, flows, recording, pace) if flows else []
+    astray = wandering(plant, windows)
+    suspected = suspects(plant, flows, recording, astray) if flows else []
     if not suspected:
         return None
     noise = dict(zip(plant.measured, windows.noise, strict=True))
-    always = process_noise(plant, pace)
     decimate = max(round(_grid_s(plant, recording) / recording.sample_time_s), 1)
 
     def lacking(unknown: dict[str, float]) -> PlantFilter:
-        return recording_filter(plant, recording, unknown, noise, always, decimate)
+        return recording_filter(plant, recording, unknown, noise, astray.process, decimate)
 
     gains = _gains(suspected, lacking, recording)
     if not gains:

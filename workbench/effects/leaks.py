@@ -48,7 +48,7 @@ class HairlineLeak(ChamberLeak):
     of such a chamber is: only their ratio shows).
     """
 
-    area_m2: Expression = strength(typical=3e-11, upper=1e-8)
+    area_m2: Expression = strength(typical=3e-11, upper=1e-5)
 
 
 @dataclass(frozen=True, kw_only=True)

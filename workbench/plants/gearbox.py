@@ -27,7 +27,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from math import pi
 
-from workbench.effect import Effect
+from workbench.effect import Effect, Part
 from workbench.effects import (
     ChamberLeak,
     CommandDelay,
@@ -50,7 +50,6 @@ from workbench.effects import (
 from workbench.effects.sensors import sensor_flaws
 from workbench.floating_piston import ControlChamber, FloatingPiston, SharedChamber
 from workbench.lever import Lever, LeverLoad
-from workbench.part import Part
 from workbench.parts import Atmosphere, Body, Chamber, Supply
 from workbench.plant import Plant, Signal
 

@@ -1,10 +1,13 @@
-"""What owns a balance: a part, and the equations that it keeps."""
+"""What a part says of its balances: which flows they take, and in which state a missing one shows.
+
+Source: diagnosis.md 1.3 (a missing term per balance equation).
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from workbench.effect import Balance, Conditions, Effect, Expression, Received, Term
+from workbench.effect import Balance, Conditions, Expression, MassFlow, Term
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,19 +28,8 @@ class BalanceEquation:
     state: str
     rates: tuple[float, float]
 
-
-class Part(Effect):
-    """A part owns a balance: it collects the flows that others put in."""
-
-    @property
-    def balances(self) -> tuple[BalanceEquation, ...]:
-        """What it balances; see :class:`BalanceEquation`."""
-        return ()
-
-    def derive(self, now: Conditions) -> dict[str, Expression]:
-        """Quantities that follow from the states at once, for example a volume."""
-        return {}
-
-    def close(self, now: Conditions, received: Received) -> dict[str, Expression]:
-        """Quantities that follow from what was received, for example a held rod's force."""
-        return {}
+    def missing(self, part: str, size: Expression, now: Conditions) -> Term:
+        """A flow of which only the size is known; gas comes at the temperature of the part."""
+        if issubclass(self.kind, MassFlow):
+            return self.kind(part, size, now[part].temperature_k)
+        return self.kind(part, size)
