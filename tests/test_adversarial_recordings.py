@@ -133,8 +133,9 @@ def test_a_fit_refuses_and_warns(demo):
     rig, train, _ = demo
     with pytest.raises(InputError, match="look exchanged"):
         fit(rig, [spoil.SERVO_DRIVE["pressures exchanged"](train)])
-    with pytest.warns(RecordingWarning, match="stuck"):
-        fit(rig, [spoil.stuck(PLACE, 2.0)(train.part(0, 3000))], only=["slide.mass_kg"])
+    with pytest.warns(RecordingWarning, match="samples seem taken"):
+        late = spoil.SERVO_DRIVE["clock jitter"](train.part(0, 3000))
+        fit(rig, [late], only=["slide.mass_kg"])
 
 
 CAP, ROD_SIDE = "cap.pressure_pa", "rod_side.pressure_pa"

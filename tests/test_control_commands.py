@@ -1,6 +1,7 @@
 """`design` and `check`: what they refuse, what they warn of, and what the answer depends on."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from studies.closed_loop_check import Check
 from studies.closed_loop_metrics import LOST_SHARE, Metrics, table
 from studies.documents import check_document
 from workbench.plants import PLANTS
+from workbench.recording import Recording
 
 PLANT = PLANTS["servo_drive"]()
 
@@ -43,6 +45,7 @@ def row(scenario, error_m, cycle_m, rmse_m, amplitude_m):
 
 NONE = float("nan")
 GOOD, FAR = row("step", 1e-4, 1e-5, 2e-2, NONE), row("step", 5e-4, 1e-5, 2e-2, NONE)
+RECORD = SimpleNamespace(recording=Recording("step", 1e-3, {"slide.position_m": np.zeros(3)}))
 FOLLOWED = row("sine", NONE, NONE, 3e-4, 0.08)
 LOST = replace(FOLLOWED, rmse_m=1.1 * LOST_SHARE * 0.08)
 
@@ -145,7 +148,7 @@ def test_a_check_warns_once_of_a_design_for_other_values(place, monkeypatch, tmp
     ]  # fmt: skip
     rig = tmp_path / "rig.toml"
     rig.write_text('plant = "servo_drive"\n[values]\n' + "\n".join(values) + "\n")
-    monkeypatch.setattr(checking, "check", lambda *_, **__: Check((GOOD,), ()))
+    monkeypatch.setattr(checking, "check", lambda *_, **__: Check((GOOD,), (RECORD,)))
 
     answer = call("check", rig, place / "new" / "folder" / "pid.toml", "-q")
 

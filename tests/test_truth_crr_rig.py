@@ -192,7 +192,9 @@ def test_a_bench_speaks_the_language_of_its_plant(bench):
     signals = {s.name for s in (*plant.commands, *plant.optional_inputs)} | set(plant.measured)
     causes = {name.partition("@")[0] for name in plant.candidates}
 
-    assert {public for public, _ in bench.channels.values()} == signals
+    told = {public for public, _ in bench.channels.values()}
+    assert set(plant.measured) <= told <= signals
+    assert {s.name for s in plant.commands} <= told
     assert set(bench.always_there) <= causes
     for hidden in bench.truth.hidden:
         case = bench.truth.draw(hidden, 1)

@@ -38,9 +38,11 @@ MEDIAN_OF_NORMAL = 0.6745
 def noisy(plant: Plant, recording: Recording, unexplained: np.ndarray) -> list[Finding]:
     """Outputs that are nothing but noise, although the plant says they move.
 
-    A sensor at rest is noise too, but then the plant agrees that nothing moves.
+    A sensor at rest is noise too, but then nothing drives the plant.
     """
-    found = []
+    found: list[Finding] = []
+    if not _driven(plant, recording):
+        return found
     for name, share in zip(plant.measured, unexplained, strict=True):
         white = _white_share(recording, name)
         if white > WHITE and share > 1.0 and not _small(plant, recording, name):
@@ -48,6 +50,17 @@ def noisy(plant: Plant, recording: Recording, unexplained: np.ndarray) -> list[F
             remedy = "check the wiring, or leave the channel out of [recording.channels]"
             found.append(_finding(Weight.REFUSED, recording, name, what, remedy))
     return found
+
+
+def _driven(plant: Plant, recording: Recording) -> bool:
+    """Whether a command changes, or a measured input by more than noise; true without any."""
+    commands = [recording[s.name] for s in plant.commands]
+    inputs = [s.name for s in plant.measured_inputs]
+    changes = any(np.nanstd(values) > 0.0 for values in commands)
+    moves = any(
+        np.nanstd(recording[n]) > 0.0 and _white_share(recording, n) < WHITE for n in inputs
+    )
+    return changes or moves or not (commands or inputs)
 
 
 def _small(plant: Plant, recording: Recording, name: str) -> bool:

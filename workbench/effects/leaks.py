@@ -46,6 +46,8 @@ class HairlineLeak(ChamberLeak):
 
     A typical area takes 0.3 % of 8 bar from a tenth of a litre in a minute (*chosen*, as the volume
     of such a chamber is: only their ratio shows).
+
+    Source: that of :class:`ChamberLeak`.
     """
 
     area_m2: Expression = strength(typical=3e-11, upper=1e-5)

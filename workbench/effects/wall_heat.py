@@ -131,8 +131,9 @@ class HeatedWall(WallHeat):
 class StillWall(HeatedWall):
     """The same around gas at rest, which gives its heat to the wall by natural convection alone.
 
-    Typical is 5 W/(m^2 K), of 2 to 25 for gases (Incropera, "Fundamentals of heat and mass
-    transfer", table 1.1).
+    Typical is 5 W/(m^2 K), of the 2 to 25 that gases have.
+
+    Source: Incropera, "Fundamentals of heat and mass transfer", table 1.1.
     """
 
     coefficient_w_m2_k: Expression = strength(typical=5.0, upper=1e3)
