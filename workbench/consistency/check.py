@@ -37,6 +37,7 @@ CERTAIN_GAIN = 2.0
 CONCERNED = 3  # outputs that a misreading concerns: more do not water it down
 FIRST_LOOK = 4  # windows, for all misreadings
 FOLLOWED = 3  # misreadings that are looked at in all windows
+EXPLAINS = 1.3  # unexplained at the most, read in another way: noise fits some way best, but none
 AS_GOOD = 1.25  # another misreading that leaves no more than so many times the least is named too
 LEAST = 0.05  # unexplained shares below it count as this
 
@@ -109,7 +110,7 @@ def _misread(
     means = _mean(after)
     best = int(np.argmin(means))
     gain = float(_mean(before[moves]) / means[best])
-    if gain < SUSPECT_GAIN:
+    if gain < SUSPECT_GAIN or means[best] > EXPLAINS:
         return []
     weight = Weight.REFUSED if gain > CERTAIN_GAIN else Weight.DOUBT
     names = [public_name(name) for name, m in zip(plant.measured, moves, strict=True) if m]

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from workbench.fitting.error_model import ACTIVE
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.noise import measured_noise
 from workbench.fitting.problem import window_length_s
@@ -30,7 +31,6 @@ from workbench.simulation import inputs
 
 MOST_PROBED = 16  # windows
 LEAST_SAMPLES = 20  # of a window
-MOVING = 10.0  # noise deviations of an output that moves in the windows
 ABSURD = 50.0  # typical sizes of a state: a start beyond takes for ever and explains nothing
 WORST = 1e3  # of what is unexplained; more, or no number at all, says no more
 
@@ -61,7 +61,7 @@ def moving(plant: Plant, recording: Recording, where: Probe) -> np.ndarray:
     """Which outputs move in the windows beyond their noise, (n_y,)."""
     cut = cut_rows(recording.rows(plant.measured), where.firsts, where.length)
     size = np.sqrt(np.nanmean(np.nanvar(cut, axis=2), axis=1))
-    return size > MOVING * np.array([_noise(recording, name) for name in plant.measured])
+    return size > ACTIVE * np.array([_noise(recording, name) for name in plant.measured])
 
 
 def unexplained(plant: Plant, readings: Sequence[Recording], where: Probe) -> np.ndarray:
@@ -106,7 +106,7 @@ def left_unexplained(fit: Fit) -> dict[str, float]:
     """The same for the windows of a fit, by full name of the outputs that move."""
     windows = fit.windows
     error = fit.residual * windows.scale[:, :, None]
-    moves = np.sqrt(np.mean(windows.activity**2, axis=1)) > MOVING * windows.noise
+    moves = np.sqrt(np.mean(windows.activity**2, axis=1)) > ACTIVE * windows.noise
     found = _ratio(error, windows.measured, not windows.plant.state_list)
     return {n: float(x) for n, x, m in zip(windows.plant.measured, found, moves, strict=True) if m}
 

@@ -15,7 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from workbench.consistency.explained import MOVING, Probe, predicted_motion
+from workbench.consistency.explained import Probe, predicted_motion
 from workbench.consistency.findings import Finding, Weight
 from workbench.effects.forces import EndStops
 from workbench.fitting.noise import THIRD_DIFFERENCE_GAIN, measured_noise
@@ -30,6 +30,7 @@ OUTSIDE = 0.2  # of the stroke: a position that far beyond a stop cannot be
 LEAST_STUCK = 0.02  # of a recording
 LOOKED_AT = 8  # windows of a stretch in which a sensor may be stuck
 UNEVEN = 0.1  # of a sample: a clock that ticks as unevenly as that is worth a word
+CLEARLY = 10.0  # noise deviations: a motion that a sensor cannot miss
 STEEPEST = 0.2  # share of the samples at which an uneven clock shows most
 FINE = 0.05  # of a sample: the jitter that a channel must be able to show
 MEDIAN_OF_NORMAL = 0.6745
@@ -124,7 +125,7 @@ def _should_move(plant: Plant, recording: Recording, name: str, stretch: tuple[i
     chosen = tuple(firsts[k] for k in evenly(len(firsts), min(LOOKED_AT, len(firsts))))
     motion = predicted_motion(plant, recording, Probe(chosen, size))
     usual = measured_noise([recording], [name])[name]
-    return bool(np.median(motion[plant.measured.index(name)]) > MOVING * usual)
+    return bool(np.median(motion[plant.measured.index(name)]) > CLEARLY * usual)
 
 
 def uneven_clock(plant: Plant, recording: Recording) -> list[Finding]:
