@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from studies.truth import drive as d
+from studies.truth.batch import stack
 from studies.truth.gas_network import (
     ROOM_K,
     Network,
@@ -192,7 +193,7 @@ def constant_commands(
     command_v = np.round(command_v / COMMAND_STEP_V) * COMMAND_STEP_V
     n, samples = len(command_v), round(length_s / 1e-3)
     drive = replace(drive, pressure_lag_s=PRESSURE_LAG_S)
-    batch = d.stack([drive] * n)
+    batch = stack([drive] * n)
     start_m = np.where(command_v > drive.dead_zone_centre_v, 0.010, 0.280)
     state = d.at_rest(batch, start_m, 0.8 * drive.supply_pressure_pa)
     out = open_loop(batch, np.broadcast_to(command_v, (samples, n)), state, substeps)

@@ -68,7 +68,7 @@ def commanded(
     start_m: float,
 ) -> Run:
     """Play commands of shape (n_samples, n_columns) as they are, after 0.3 s with a shut valve."""
-    prepared = bench(d.stack(drives))
+    prepared = bench(stack(drives))
     p = prepared.drive
     shut = np.repeat(p.dead_zone_centre_v[None], SETTLING_SAMPLES, axis=0)
     commands = np.concatenate([shut, commands_v])

@@ -34,7 +34,7 @@ from workbench.units import public_name
 WELL_EXPLAINED = 0.4  # of every output: no reason to ask further
 SUSPECT_GAIN = 1.6  # what is unexplained as read, over the same read in another way
 CERTAIN_GAIN = 2.0
-CONCERNED = 3  # outputs that a misreading concerns: more do not water it down
+CONCERNED = 3  # outputs that a misreading concerns: more do not water it down, fewer weigh less
 FIRST_LOOK = 4  # windows, for all misreadings
 FOLLOWED = 3  # misreadings that are looked at in all windows
 EXPLAINS = 1.3  # unexplained at the most, read in another way: noise fits some way best, but none
@@ -109,7 +109,7 @@ def _misread(
     after = unexplained(plant, [way.undone(recording) for way in ways], where)[:, moves]
     means = _mean(after)
     best = int(np.argmin(means))
-    gain = float(_mean(before[moves]) / means[best])
+    gain = _gain(before[moves], after[best])
     if gain < SUSPECT_GAIN or means[best] > EXPLAINS:
         return []
     weight = Weight.REFUSED if gain > CERTAIN_GAIN else Weight.DOUBT
@@ -145,3 +145,14 @@ def _mean(shares: np.ndarray) -> np.ndarray:
     """
     logarithms = np.log(np.maximum(shares, LEAST))
     return np.exp(logarithms.sum(axis=-1) / min(shares.shape[-1], CONCERNED))
+
+
+def _gain(before: np.ndarray, after: np.ndarray) -> float:
+    """How many times less is unexplained, as the geometric mean over three outputs.
+
+    Where fewer move there is less evidence, and what one output gains must speak for three: a
+    missing friction makes the force of a bench look ten times too large by as much as a factor of
+    two, a wrong unit by far more.
+    """
+    gained = np.log(np.maximum(before, LEAST) / np.maximum(after, LEAST))
+    return float(np.exp(gained.sum() / CONCERNED))

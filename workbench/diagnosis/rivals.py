@@ -75,9 +75,12 @@ def distances(
 
 
 def _derivatives(windows: Windows, fit: Fit, near: Near | None) -> Linearised:
-    """Residuals and derivatives of a rival; its nuisances act nearly as those of the first one."""
+    """Residuals and derivatives of a rival; its nuisances act nearly as those of the first one.
+
+    One that lacks a state of the first, such as the lag that is its rival, has all its own.
+    """
     point = Point(fit.point.t, windows.start)
-    if near is None:
+    if near is None or not set(near[1][0].plant.state_list) <= set(windows.plant.state_list):
         return linearise(windows, fit.unknowns, point)
     return borrowed(*near, windows, fit.unknowns, point)
 
