@@ -4,11 +4,14 @@ The servo drive's are those of the demo, which the independent truth made; the o
 from the flat oracles or are real.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import oracle_crr_rig
 import oracle_soft_joint
 import pytest
 from scipy.integrate import solve_ivp
+from test_diagnosis import bench, nothing
 
 from studies import adversarial as spoil
 from studies.demo import DATA
@@ -24,6 +27,7 @@ from workbench.recordings import RECORDINGS, real_data_folder
 from workbench.rig import default_rig, load_rig
 
 FOLDER = real_data_folder()
+SAMPLES = np.arange(2000)
 A, B, PLACE, COMMAND = spoil.A, spoil.B, spoil.PLACE, spoil.COMMAND
 
 
@@ -220,6 +224,20 @@ def test_a_misread_soft_joint_is_told(joint, way):
     assert all(expected in text for text in texts)
 
 
+def test_a_recording_of_something_else_is_not_called_misread():
+    """Ten times as large it would be missed by no more than itself: that explains nothing."""
+    rig = load_rig('name = "bench"\nplant = "cylinder_bench"\n')
+    strange = [
+        replace(each, channels={**each.channels, "rod.force_n": 100.0 * np.sin(0.05 * k * SAMPLES)})
+        for k, each in enumerate((bench(1, nothing), bench(2, nothing)), start=2)
+    ]
+    found = diagnose(rig, strange[:1], strange[1:])
+
+    assert [said(rig, each) for each in strange] == [[], []]
+    assert found.verdict is Verdict.RECORDING_TOO_WEAK
+    assert found.law is None and found.after == {}
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("way", ["all slow noise", "another command"])
 def test_what_nothing_explains_gets_no_name(demo, way):
@@ -228,5 +246,5 @@ def test_what_nothing_explains_gets_no_name(demo, way):
     found = diagnose(rig, [train], [validation], most_windows=24)
 
     assert found.verdict is Verdict.RECORDING_TOO_WEAK
-    assert found.named is None
+    assert found.named is None and found.law is None and found.after == {}
     assert any("nothing explains the recording" in each for each in found.warnings)
