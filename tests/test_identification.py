@@ -16,11 +16,9 @@ from studies.truth import drive as true
 from workbench.comparison import compare
 from workbench.effects import ConstantForce, StribeckFriction
 from workbench.errors import InputError
-from workbench.identification import least_squares
 from workbench.identification.dead_volume import dead_volume
 from workbench.identification.dead_zone import dead_zone
 from workbench.identification.friction import friction
-from workbench.identification.least_squares import Unknown, correlation_samples, solve
 from workbench.identification.sliding import motion
 from workbench.identification.tank_curves import tank_curves
 from workbench.identification.wall_heat import wall_heat
@@ -245,14 +243,6 @@ def test_a_recording_with_holes_is_refused_with_its_place():
         friction(DRIVE, runs)
 
 
-def test_a_search_that_does_not_end_is_an_error(monkeypatch):
-    monkeypatch.setattr(least_squares, "MOST_EVALUATIONS", 2)
-    valley = [Unknown(-1.2, 1.0), Unknown(1.0, 1.0)]
-
-    with pytest.raises(ArithmeticError, match="did not converge in 2 evaluations"):
-        solve(lambda x: np.array([10.0 * (x[1] - x[0] ** 2), 1.0 - x[0]]), valley, noise=1.0)
-
-
 def test_the_mass_is_that_of_the_body_that_rubs():
     """Another body comes first in the plant; at constant acceleration the masses differ."""
     first, second = (Body(name=n, mass_kg=m) for n, m in (("carriage", 50.0), ("slide", 2.0)))
@@ -290,16 +280,6 @@ def test_a_cause_that_the_rig_removed_is_back_once_identified(limits):
     removed = replace(limits, rig=replace(limits.rig, removed=("valve_dead_zone", "spool_leak")))
 
     assert removed.improved().removed == ()
-
-
-def test_deviations_count_how_long_errors_stay_correlated():
-    """A mean of n values with errors equal over 20 of them is worth n / 20."""
-    rng = np.random.default_rng(3)
-    slow = np.repeat(rng.standard_normal(200), 20)
-    found = solve(lambda x: slow - x[0], [Unknown(0.0, 1.0)], noise=0.01)
-
-    assert correlation_samples(slow) == pytest.approx(20.0, rel=0.3)
-    assert found.deviations[0] == pytest.approx(1.0 / np.sqrt(200), rel=0.3)
 
 
 def test_each_result_has_a_figure(limits, heat, release, flow):
