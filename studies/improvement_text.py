@@ -29,6 +29,7 @@ def improvement_text(found: Improvement, unit_of: Mapping[str, str]) -> str:
     ]
     parts = [columns(head, rows), ""]
     parts += [f"diagnosis {k}: {d.sentence}" for k, d in enumerate(found.diagnoses, start=1)]
+    parts += [f"warning: {warning}" for warning in found.warnings]
     parts += thoughts_text(found)
     if found.law:
         parts += ["", "nothing of the catalogue earns its place any more; taken at the end:"]
@@ -96,6 +97,7 @@ def improvement_document(found: Improvement, unit_of: Mapping[str, str]) -> Docu
             for stage in found.budget
         ],
         "diagnoses": [each.sentence for each in found.diagnoses],
+        "warnings": list(found.warnings),
         "removals": [
             {
                 "effect": each.candidate.name,

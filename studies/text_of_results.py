@@ -53,20 +53,21 @@ def next_recording_text(asked: NextRecording) -> str:
 
 
 def ranking_text(found: Diagnosis) -> str:
-    """The best of the ranking as a table."""
+    """The best of the ranking as a table; compensable is what the fitted parameters can imitate."""
     rows = [
         (
             str(place),
             row.candidate.name,
             percent(row.drop_train, 1),
             percent(row.drop_validation, 1),
+            percent(row.compensable),
             sizes_text(row),
             row.decided_by.value,
             _remark(row),
         )
         for place, row in enumerate(found.ranking[:SHOWN_RANKS], start=1)
     ]
-    head = ("", "effect", "drop train", "validation", "size", "by", "")
+    head = ("", "effect", "drop train", "validation", "compensable", "size", "by", "")
     rest = len(found.ranking) - SHOWN_RANKS
     more = f"\n... and {rest} more, in the JSON" if rest > 0 else ""
     return columns(head, rows) + more

@@ -11,6 +11,7 @@ import oracle_crr_rig
 import oracle_soft_joint
 import pytest
 from scipy.integrate import solve_ivp
+from test_diagnosis import bench, nothing
 
 from studies import adversarial as spoil
 from studies.demo import DATA
@@ -26,6 +27,7 @@ from workbench.recordings import RECORDINGS, real_data_folder
 from workbench.rig import default_rig, load_rig
 
 FOLDER = real_data_folder()
+SAMPLES = np.arange(2000)
 A, B, PLACE, COMMAND = spoil.A, spoil.B, spoil.PLACE, spoil.COMMAND
 
 
@@ -228,6 +230,20 @@ def on_the_drive(recording):
     return replace(recording, channels={names[k]: v for k, v in recording.channels.items()})
 
 
+def test_a_recording_of_something_else_is_not_called_misread():
+    """Ten times as large it would be missed by no more than itself: that explains nothing."""
+    rig = load_rig('name = "bench"\nplant = "cylinder_bench"\n')
+    strange = [
+        replace(each, channels={**each.channels, "rod.force_n": 100.0 * np.sin(0.05 * k * SAMPLES)})
+        for k, each in enumerate((bench(1, nothing), bench(2, nothing)), start=2)
+    ]
+    found = diagnose(rig, strange[:1], strange[1:])
+
+    assert [said(rig, each) for each in strange] == [[], []]
+    assert found.verdict is Verdict.RECORDING_TOO_WEAK
+    assert found.law is None and found.after == {}
+
+
 @pytest.mark.slow
 def test_a_recording_of_another_plant_gets_no_name(crr):
     other = on_the_drive(crr[1])
@@ -250,7 +266,7 @@ def test_what_nothing_explains_gets_no_name(demo, way):
 
 def assert_unnamed(found):
     assert found.verdict is Verdict.RECORDING_TOO_WEAK
-    assert found.named is None
+    assert found.named is None and found.law is None and found.after == {}
     assert any("nothing explains the recording" in each for each in found.warnings)
 
 

@@ -269,6 +269,7 @@ def test_options_take_several_values_in_a_row_behind_the_arguments():
         (ValueError("no"), 2),
         (KeyboardInterrupt(), 130),
         (StopIteration(), 3),
+        (IndexError("list index out of range"), 3),
         (TypeError("argument of type 'int'\nis not iterable"), 3),
     ],
 )

@@ -13,6 +13,7 @@ from studies.truth.draw import EFFECTS
 from studies.truth.pairs import PAIRS, stored_pair
 from workbench.comparison import compare
 from workbench.comparison.free_run import free_run_errors
+from workbench.diagnosis import improve as improvement
 from workbench.diagnosis.addition import add, assembled
 from workbench.diagnosis.diagnose import diagnose, silent
 from workbench.diagnosis.improve import improve
@@ -116,6 +117,17 @@ def test_an_interrupted_backward_pass_keeps_what_the_rounds_found(rig, sets):
     assert len(found.rig.added) == len(found.steps) >= 2
 
 
+def test_free_runs_that_are_interrupted_leave_all_else(rig, sets, monkeypatch):
+    def stopped(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(improvement, "free_run_errors", stopped)
+    found = improve(rig, *sets)
+
+    assert found.stopped and found.kept and found.after["validation"]
+    assert found.free_before == found.free_after == {}
+
+
 def test_the_written_rig_gives_the_printed_errors_again(improved, sets, tmp_path):
     write_rig(improved.rig, tmp_path / "rig2.toml")
     again = load_rig(tmp_path / "rig2.toml")
@@ -144,6 +156,15 @@ def test_an_improvement_is_told_as_text_and_as_a_document(improved):
     assert [row["effect"] for row in told["removals"]] == list(improved.kept)
     (row,) = [r for r in told["parameters"] if r["name"] == "friction.coulomb_force"]
     assert row["before"] == 0.0 and row["before_std"] is None and row["after_std"] > 0
+
+
+def test_what_a_diagnosis_warns_of_is_told_once(improved):
+    first, *others = improved.diagnoses
+    warned = [replace(each, warnings=("a doubt",)) for each in (first, first)]
+    doubtful = replace(improved, diagnoses=(*warned, *others))
+
+    assert improvement_text(doubtful, UNITS).count("warning: a doubt") == 1
+    assert improvement_document(doubtful, UNITS)["warnings"] == ["a doubt"]
 
 
 def test_dropped_and_swapped_steps_are_marked_in_the_budget(improved):

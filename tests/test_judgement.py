@@ -11,15 +11,17 @@ from workbench.diagnosis.diagnose import _followed, diagnose, silent
 from workbench.diagnosis.improve import add, improve
 from workbench.diagnosis.judge import SHARE_REASON, reasons_against, tie_group
 from workbench.diagnosis.ranking import ranked
-from workbench.diagnosis.result import Size, Verdict
+from workbench.diagnosis.result import DecidedBy, Size, Verdict
 from workbench.diagnosis.shifts import shifts
 from workbench.diagnosis.verdict import judged, sentence
 from workbench.fitting.error_model import error_model
 from workbench.fitting.fit import fit
-from workbench.fitting.problem import pose, split, window_length_s
+from workbench.fitting.problem import pose, split
+from workbench.fitting.window_length import window_length_s
 from workbench.plants.servo_drive import servo_drive
 from workbench.recording import Recording
 from workbench.rig import default_rig, load_rig
+from workbench.rig_writing import rig_text
 
 BARE = 'name = "bench"\nplant = "cylinder_bench"\n[values]\n"chamber.area" = "518.7 mm^2"\n'
 TRAIN, HELD_OUT = bench(1, coulomb), bench(2, coulomb, gauge_pa=4e5)
@@ -157,6 +159,42 @@ def test_add_refuses_what_the_rig_fixes_and_what_changes_nothing():
         add(load_rig(fixed), "coulomb_friction", [TRAIN], [HELD_OUT])
     with pytest.raises(ValueError, match=r"nothing without friction\.coulomb_force_n"):
         add(load_rig(BARE), "stiction", [TRAIN], [HELD_OUT])
+
+
+def test_what_the_rig_removes_can_be_added_again_and_is_written():
+    rig = load_rig(f'{BARE}[effects]\nremove = ["coulomb_friction"]\n')
+    found = add(rig, "coulomb_friction", [TRAIN], [HELD_OUT]).rig
+    again = load_rig(rig_text(found))
+
+    assert (again.added, again.removed) == (("coulomb_friction",), ())
+    assert again.plant.values["friction.coulomb_force_n"] == pytest.approx(8.0, rel=0.05)
+    assert again.plant.values == found.plant.values
+
+
+def test_what_the_rig_fixes_is_not_asked():
+    fixed = load_rig(f'{BARE}[fixed]\nnames = ["friction.coulomb_force"]\n')
+    found = diagnose(fixed, [TRAIN], [HELD_OUT])
+    (row,) = [r for r in found.ranking if r.candidate.name == "coulomb_friction"]
+
+    assert row.decided_by is DecidedBy.NOT_APPLICABLE
+    assert row.reasons == ("not applicable: fixed by the rig",)
+
+
+def test_a_size_that_a_rounding_parts_from_its_bound_is_at_it(problem, sound):
+    name, size = sound.candidate.strength, sound.size[sound.candidate.strength]
+    upper = sound.fit.plant.parameters[name].upper
+    below = replace(sound, size={name: replace(size, value=np.nextafter(upper, 0.0))})
+
+    assert reasons_against(problem.base, below) == ("its size is at a bound",)
+
+
+def test_a_training_recording_that_is_to_be_validation_is_told():
+    with pytest.warns(UserWarning, match="proves nothing"):
+        add(load_rig(BARE), "coulomb_friction", [TRAIN], [TRAIN])
+    with pytest.warns(UserWarning, match="proves nothing"):
+        fit(load_rig(BARE), [TRAIN], [TRAIN])
+    with pytest.raises(ValueError, match="proves nothing; expected another manoeuvre"):
+        improve(load_rig(BARE), [TRAIN], [HELD_OUT, TRAIN])
 
 
 def test_a_fit_of_nothing_is_refused():

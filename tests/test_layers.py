@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+import workbench
+
 ROOT = Path(__file__).parent.parent
 ALLOWED = {
     "workbench": {"workbench"},
@@ -61,6 +63,17 @@ def test_a_folder_imports_only_what_lies_below_it(folder):
     for path in paths:
         ours = {name.split(".")[0] for name in imported(path)} & ALLOWED.keys()
         assert ours <= ALLOWED[folder], f"{path.relative_to(ROOT)} imports {ours - ALLOWED[folder]}"
+
+
+def test_the_verbs_are_functions_of_the_package_and_imported_when_asked_for():
+    script = "import sys, workbench; print('casadi' in sys.modules); print(workbench.compare)"
+    told = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True)
+
+    assert told.stdout.split()[:3] == ["False", "<function", "compare"], told.stderr
+    for verb in workbench.__all__:
+        assert getattr(workbench, verb).__name__ == verb
+    with pytest.raises(AttributeError, match="no attribute 'compere'"):
+        getattr(workbench, "compere")  # noqa: B009
 
 
 def test_fitting_and_comparison_know_nothing_of_diagnosis():

@@ -169,6 +169,18 @@ def test_a_diagnosis_reads_in_the_units_of_people():
     assert "0.051 mm^2 ± 0.002 mm^2" in said
     assert "0.08123 bar" in said and "0.009 bar" in said
     assert "valve closed 74 %" in said
+    (head,) = [line for line in said.splitlines() if "drop train" in line]
+    assert "compensable" in head and said.count(" 12 % ") == 2
+
+
+def test_balances_stand_in_one_line_each_and_no_more_than_eight():
+    found = diagnosis()
+    many = {f"chamber_{k}.mass": float(k) for k in range(12)} | {"chamber_a.mass": 99.0}
+    figure = diagnosis_figures(replace(found, where=replace(found.where, by_balance=many)))
+    labels = [t.get_text() for t in figure["missing_term"].axes[1].get_yticklabels()]
+
+    assert labels[:2] == ["chamber a mass", "chamber 11 mass"]
+    assert len(labels) == 8
 
 
 def test_columns_of_numbers_are_flush_right():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf
@@ -76,6 +76,12 @@ class Rig:
     def ambient_pa(self) -> float:
         """The pressure that gauge pressures count from."""
         return self.plant.values.get(AMBIENT, STANDARD_ATMOSPHERE_PA)
+
+    def with_added(self, plant: Plant, names: Iterable[str]) -> Rig:
+        """The rig with a plant in which more causes stand: free in a fit, and removed no longer."""
+        names = tuple(names)
+        removed = tuple(name for name in self.removed if name not in names)
+        return replace(self, plant=plant, added=(*self.added, *names), removed=removed)
 
     def added_to(self, plant: Plant) -> tuple[Candidate, ...]:
         """The causes that the rig added, as far as this plant has a place for them."""

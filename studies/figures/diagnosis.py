@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from workbench.diagnosis.result import Dependence, Diagnosis, Where
 
-SHOWN = 10
+SHOWN, SHOWN_BALANCES = 10, 8
 
 
 def diagnosis_figures(found: Diagnosis, prefix: str = "") -> dict[str, Figure]:
@@ -73,12 +73,9 @@ def missing_term_figure(where: Where) -> Figure:
     strongest = [d for d in where.against if d.bins.shape[1]][:2]
     with styled():
         figure = new_figure(PAGE_IN, 3.6)
-        top, bottom = figure.subplots(2, 1, height_ratios=(1, 1.3), squeeze=True), None
-        grid = top[0].get_gridspec()
-        for axes in top:
-            axes.remove()
+        grid = figure.add_gridspec(2, 1, height_ratios=(1, 1.3))
         whole = figure.add_subplot(grid[0])
-        inner = grid[1].subgridspec(1, 1 + max(len(strongest), 1))
+        inner = grid[1].subgridspec(1, 1 + len(strongest))
         bottom = [figure.add_subplot(inner[k]) for k in range(1 + len(strongest))]
         _draw_term(whole, where)
         _draw_balances(bottom[0], where)
@@ -106,9 +103,9 @@ def _draw_term(axes: Axes, where: Where) -> None:
 
 
 def _draw_balances(axes: Axes, where: Where) -> None:
-    gains = sorted(where.by_balance.items(), key=lambda item: -item[1])
+    gains = sorted(where.by_balance.items(), key=lambda item: -item[1])[:SHOWN_BALANCES]
     places = np.arange(len(gains))
-    axes.set_yticks(places, [name.replace(".", "\n").replace("_", " ") for name, _ in gains])
+    axes.set_yticks(places, [name.replace(".", " ").replace("_", " ") for name, _ in gains])
     colours = [RED if name == where.balance else GREY for name, _ in gains]
     axes.barh(places, [max(gain, 0.0) for _, gain in gains], 0.6, color=colours)
     axes.invert_yaxis()

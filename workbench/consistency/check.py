@@ -39,6 +39,7 @@ FIRST_LOOK = 4  # windows, for all misreadings
 FOLLOWED = 3  # misreadings that are looked at in all windows
 EXPLAINS = 1.3  # unexplained at the most, read in another way: noise fits some way best, but none
 AS_GOOD = 1.25  # another misreading that leaves no more than so many times the least is named too
+STILL_MISSED = 0.9  # of every output that a misreading concerns: then it explains nothing
 LEAST = 0.05  # unexplained shares below it count as this
 
 Set = tuple[Recording, ...]
@@ -107,7 +108,11 @@ def _misread(
     rough = _mean(unexplained(plant, [way.undone(recording) for way in ways], few)[:, moves])
     ways = [ways[k] for k in np.argsort(rough, kind="stable")[:FOLLOWED]]
     after = unexplained(plant, [way.undone(recording) for way in ways], where)[:, moves]
-    means = _mean(after)
+    means = np.where(
+        [_explains(plant, w, a, moves) for w, a in zip(ways, after, strict=True)],
+        _mean(after),
+        np.inf,
+    )
     best = int(np.argmin(means))
     gain = _gain(before[moves], after[best])
     if gain < SUSPECT_GAIN or means[best] > EXPLAINS:
@@ -122,6 +127,16 @@ def _misread(
         if way is not ways[best] and mean < AS_GOOD * means[best]
     ]
     return [_finding(weight, recording, ways[best], others, shares)]
+
+
+def _explains(plant: Plant, way: Misreading, after: np.ndarray, moves: np.ndarray) -> bool:
+    """Whether the plant says anything of one of the outputs concerned, read that way.
+
+    A signal read a thousand times larger is missed by no more than itself, whatever it is of.
+    """
+    moving_names = (name for name, m in zip(plant.measured, moves, strict=True) if m)
+    own = np.array([name in way.channels for name in moving_names])
+    return bool((after[own] if own.any() else after).min() < STILL_MISSED)
 
 
 def _finding(

@@ -22,9 +22,9 @@ import numpy as np
 from workbench.fitting.error_model import ACTIVE
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.noise import measured_noise
-from workbench.fitting.problem import window_length_s
 from workbench.fitting.starts import long_holes, sensed_states
 from workbench.fitting.window_cuts import cut_rows, received_windows, window_firsts, window_run
+from workbench.fitting.window_length import window_length_s
 from workbench.plant import Plant
 from workbench.recording import Recording
 from workbench.simulation import inputs

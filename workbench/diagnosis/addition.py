@@ -16,7 +16,7 @@ from workbench.diagnosis.scan import scan
 from workbench.fitting.errors import Errors, errors_of
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.posterior import fitted_rig, posterior_deviation
-from workbench.fitting.problem import Problem, pose, split
+from workbench.fitting.problem import NO_EVIDENCE, Problem, pose, proves_nothing, split
 from workbench.law_range import ranges_text
 from workbench.plant import Candidate, require
 from workbench.recording import Recording
@@ -121,9 +121,11 @@ def add_law(
 def _with_held_out(
     rig: Rig, train: Sequence[Recording], validation: Sequence[Recording]
 ) -> tuple[Sequence[Recording], Sequence[Recording]]:
-    """Recordings to train on and to hold out; a third of the first where there are no others."""
+    """Recordings to train on and to hold out: their last thirds where there are no others."""
     train, validation = checked(rig, train, validation)
     if validation:
+        if proves_nothing(train, validation):
+            warnings.warn(NO_EVIDENCE, stacklevel=3)
         return train, validation
     warnings.warn(WEAK_EVIDENCE, stacklevel=3)
     return split(train)
@@ -199,7 +201,7 @@ def freed(rig: Rig, step: Addition, own: Iterable[str] | None = None) -> Rig:
     found = {name: values[name] for name in (*free, *unknowns.held) if name in ours}
     plant = rig.plant.with_values(found)
     if is_new(rig, step.candidate):
-        return replace(rig, plant=plant, added=(*rig.added, step.candidate.name))
+        return rig.with_added(plant, [step.candidate.name])
     known = dict(zip(unknowns.names, posterior_deviation(fit).tolist(), strict=True))
     loosened = {**rig.deviations, **{name: known[name] for name in free}}
     return replace(rig, plant=plant, deviations=loosened)

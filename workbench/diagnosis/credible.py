@@ -30,7 +30,13 @@ def credible(found: Diagnosis, doubts: Sequence[Finding]) -> Diagnosis:
         sentence = "the recording and the rig contradict each other; nothing is named"
         verdict = Verdict.RECORDING_TOO_WEAK
         return replace(
-            found, verdict=verdict, sentence=sentence, warnings=(*found.warnings, warning)
+            found,
+            verdict=verdict,
+            sentence=sentence,
+            after={},
+            law=None,
+            warnings=(*found.warnings, warning),
+            next_recording=None,
         )
     if found.verdict is Verdict.FOUND and any(each.weight is Weight.DOUBT for each in doubts):
         sentence = f"{found.sentence}, if the recording can be trusted"

@@ -35,9 +35,16 @@ from workbench.diagnosis.verdict import far_above_noise, judged, sentence, unexp
 from workbench.diagnosis.where import acts_in, locate
 from workbench.effect import Kind
 from workbench.fitting.errors import errors_of
-from workbench.fitting.problem import Problem, improved_base, pose, split
+from workbench.fitting.problem import (
+    NO_EVIDENCE,
+    Problem,
+    improved_base,
+    pose,
+    proves_nothing,
+    split,
+)
 from workbench.fitting.windows import MOST_WINDOWS
-from workbench.recording import Recording, same_data
+from workbench.recording import Recording
 from workbench.rig import Rig
 
 FITTED_FIRST = 8  # candidates that are followed beyond the scan at the most
@@ -52,8 +59,6 @@ CERTAIN_SHARE = 0.5  # an accepted candidate above it needs no comparison with a
 WEAK_EVIDENCE = "no validation recording: the last third is held out, which is weak evidence"
 
 FEW_WINDOWS = "what is held out is no more than a few slow decays, which is weak evidence"
-
-NO_EVIDENCE = "a validation recording is one of the training recordings, which proves nothing"
 
 Progress = Callable[[str], None]
 
@@ -90,7 +95,7 @@ def diagnose(
     if not held_out:
         train, validation = split(train)
         warnings += (WEAK_EVIDENCE,)
-    elif any(same_data(one, other) for one in train for other in validation):
+    elif proves_nothing(train, validation):
         held_out = False
         warnings += (NO_EVIDENCE,)
     progress("prior fit")
@@ -198,7 +203,8 @@ def _scanned(problem: Problem) -> list[Profile]:
     absent = [
         c
         for c in problem.whole.candidates.values()
-        if c.held is None and c not in problem.added and base.windows.plant.ready_for(c)
+        if c.held is None and c.strength not in problem.rig.fixed
+        and c not in problem.added and base.windows.plant.ready_for(c)
         and (c.cause.tolerated or values.get(c.strength, known[c.strength].null)
              == known[c.strength].null)
     ]  # fmt: skip

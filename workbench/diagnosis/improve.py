@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from math import inf
 
 from workbench.comparison.free_run import free_run_errors
+from workbench.consistency import checked
 from workbench.diagnosis.addition import (
     Addition,
     Moved,
@@ -29,9 +30,10 @@ from workbench.diagnosis.diagnose import Progress, diagnose, silent
 from workbench.diagnosis.improvement import Change, Improvement, Stage
 from workbench.diagnosis.passes import Kept, Passes, Removal, Swap
 from workbench.diagnosis.result import Diagnosis, Law
-from workbench.fitting.errors import errors_of, per_sample
+from workbench.fitting.errors import Errors, errors_of, per_sample
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.posterior import fitted_rig
+from workbench.fitting.problem import NO_EVIDENCE, proves_nothing
 from workbench.recording import Recording
 from workbench.rig import Rig
 
@@ -77,10 +79,14 @@ def improve(
     Raises
     ------
     ValueError
-        Without a validation recording: what is added again and again must hold elsewhere too.
+        Without a validation recording, or with one of the training: what is added again and again
+        must hold elsewhere too.
     """
     if not validation:
         raise ValueError("improve needs a validation recording: another manoeuvre, held out")
+    if proves_nothing(train, validation):
+        raise ValueError(f"{NO_EVIDENCE}; expected another manoeuvre")
+    train, validation = checked(rig, train, validation)
     done = _forward(_Rounds(rig), train, validation, progress)
     for proceed in (_thought_over, _with_law) if law else (_thought_over,):
         if not done.stopped:
@@ -210,6 +216,11 @@ def _improvement(
         parameters = tuple(_counted_from(done.rig, row) for row in moved_parameters(fit))
     sets, windows = {"train": train, "validation": validation}, fit.windows
     noise = dict(zip(windows.plant.measured, windows.noise.tolist(), strict=True))
+    free: tuple[Errors, Errors] = {}, {}
+    try:
+        free = free_run_errors(done.rig, sets, noise), free_run_errors(final, sets, noise)
+    except KeyboardInterrupt:  # all else is finished
+        done = replace(done, stopped=True)
     return Improvement(
         rig=final,
         steps=done.steps,
@@ -219,8 +230,8 @@ def _improvement(
         law=done.law,
         before=first.before,
         after=errors_of(fit, held_out),
-        free_before=free_run_errors(done.rig, sets, noise),
-        free_after=free_run_errors(final, sets, noise),
+        free_before=free[0],
+        free_after=free[1],
         parameters=parameters,
         budget=done.budget,
         stopped=done.stopped,

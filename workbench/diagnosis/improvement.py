@@ -50,7 +50,8 @@ class Improvement:
     before, after
         Errors over windows with free starts on both sets, as the rig came and in the end.
     free_before, free_after
-        The same over free runs; empty for a plant without states.  Where positions integrate they
+        The same over free runs; empty for a plant without states, or where the user stopped them.
+        Where positions integrate they
         are no judge: the right effect can make them worse until the next one is there.
     parameters
         Before and after with standard deviations, of all that the final fit moved.
@@ -77,6 +78,11 @@ class Improvement:
     stopped: bool
     fit: Fit = field(repr=False)
     validation_fit: Fit | None = field(repr=False)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the diagnoses warn of, each once."""
+        return tuple(dict.fromkeys(w for found in self.diagnoses for w in found.warnings))
 
     @property
     def kept(self) -> tuple[str, ...]:

@@ -16,7 +16,7 @@ the criterion.  A candidate is accepted when
 
 from __future__ import annotations
 
-from math import isnan, log, sqrt
+from math import isclose, isnan, log, sqrt
 
 import numpy as np
 
@@ -33,6 +33,7 @@ LEAST_TRAINING = 0.10
 LEAST_SIZE = 0.03
 DISTINCT = 2.0  # posterior standard deviations
 FEWEST_WINDOWS = 6  # held out, for recordings of what does not move to refuse anything
+AT_BOUND = 1e-9  # relative: a value scaled and back is off by a rounding
 LARGEST_TIE = 3
 SAME_DIRECTION = 0.9  # cosine of two signatures that are one
 CLOSE_DROP = 0.25  # of the leader's drop: within it the order is not to be trusted
@@ -119,7 +120,8 @@ def _size_reasons(refit: Refit) -> list[str]:
         reasons.append("its size is negligible")
     elif abs(size - null) < DISTINCT * refit.size[name].deviation:
         reasons.append("its size is not distinct from none")
-    if abs(size - null) > 0 and size in (known.lower, known.upper) and size != known.typical:
+    ends = (end for end in (known.lower, known.upper) if end not in (null, known.typical))
+    if any(isclose(size, end, rel_tol=AT_BOUND, abs_tol=0.0) for end in ends):
         reasons.append("its size is at a bound")
     return reasons
 

@@ -48,7 +48,7 @@ def ranked(
 
 
 def _not_asked(problem: Problem, asked: set[str]) -> list[Ranked]:
-    """Causes of the rig's plant without a row yet: measured here, or there already.
+    """Causes of the rig's plant without a row yet: measured here, fixed, or there already.
 
     Where the recording measures what a cause produces, the cause has no place.  Empirical terms
     that the rig has are no causes.
@@ -77,6 +77,8 @@ def _reason_not_asked(problem: Problem, candidate: Candidate) -> str:
         return "not applicable: measured"
     if not problem.rig.plant.ready_for(candidate):
         return f"nothing without {candidate.member}.{candidate.cause.needs}"
+    if (candidate.held or candidate.strength) in problem.rig.fixed:
+        return "not applicable: fixed by the rig"
     return "there already"
 
 

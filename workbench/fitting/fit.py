@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -11,7 +12,7 @@ from workbench.consistency import checked
 from workbench.fitting.errors import Errors, errors_of
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.posterior import fitted_rig, posterior_covariance
-from workbench.fitting.problem import Problem, pose
+from workbench.fitting.problem import NO_EVIDENCE, Problem, pose, proves_nothing
 from workbench.fitting.start_states import refit_starts
 from workbench.fitting.unknowns import nominal_unknowns
 from workbench.plant import require
@@ -86,6 +87,8 @@ def fit(
         names = ", ".join(only) or "the plant"
         raise ValueError(f"nothing to fit: {names} is fixed or has no uncertainty in {rig.name}")
     train, validation = checked(rig, train, validation)
+    if proves_nothing(train, validation):
+        warnings.warn(NO_EVIDENCE, stacklevel=2)
     progress("fit")
     problem = pose(held, train, validation)
     before = _untouched(problem)

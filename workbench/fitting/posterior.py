@@ -44,9 +44,7 @@ def fitted_rig(rig: Rig, fit: Fit, added: Sequence[str] = ()) -> Rig:
     values = {name: value for name, value in found.items() if name in ours}
     deviations = dict(zip(fit.unknowns.names, posterior_deviation(fit).tolist(), strict=True))
     return replace(
-        rig,
-        plant=rig.plant.with_values(values),
-        added=(*rig.added, *added),
+        rig.with_added(rig.plant.with_values(values), added),
         deviations={**rig.deviations, **{n: d for n, d in deviations.items() if d > 0}},
         seen=seen_in(rig.plant, fit.windows.recordings) if laws_of(rig.plant) else {},
     )

@@ -13,12 +13,13 @@ from workbench.fitting.unknowns import Unknowns, nominal_unknowns
 from workbench.fitting.window_length import window_length_s
 from workbench.fitting.windows import MOST_WINDOWS, cut_windows, one_clock
 from workbench.plant import Candidate, Plant
-from workbench.recording import Recording
+from workbench.recording import Recording, same_data
 from workbench.rig import Rig
 
 FIRST_ITERATIONS = 3  # with scales from the model as it came
 ITERATIONS = 12  # with scales from the first fit
 LEAST_HELD_OUT_WINDOWS = 24
+NO_EVIDENCE = "a validation recording is one of the training recordings, which proves nothing"
 LEAST_IMPROVEMENT = 0.03  # of the misfit, for a prior fit to be taken up again
 
 
@@ -156,6 +157,11 @@ def _held_out(
     windows = windows.scaled_like(base.windows)
     rough = refit_starts(windows, base.plant.values)
     return refit_starts(windows.capped(rough.residual), base.plant.values, rough)
+
+
+def proves_nothing(train: Sequence[Recording], validation: Sequence[Recording]) -> bool:
+    """True where a recording stands in both sets."""
+    return any(same_data(one, other) for one in train for other in validation)
 
 
 def split(recordings: Sequence[Recording]) -> tuple[list[Recording], list[Recording]]:

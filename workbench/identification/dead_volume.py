@@ -29,7 +29,7 @@ from workbench.identification.held_gas import (
     position_channel,
     pressed_chamber,
 )
-from workbench.identification.result import Curve, Estimate, Identified, Procedure, unfit
+from workbench.identification.result import Curve, Estimate, Identified, Procedure, complete, unfit
 from workbench.parts import Chamber
 from workbench.plant import Plant
 from workbench.recording import Recording
@@ -76,6 +76,7 @@ def dead_volume(
     InputError
         If a recording has no release into a locked chamber, or ends before the flat window.
     """
+    complete(recordings)
     plant = rig.fit_for(recordings[0])
     found: dict[str, tuple[Estimate, Estimate]] = {}
     releases, curves = [], []

@@ -24,7 +24,7 @@ from workbench.errors import InputError, Message
 from workbench.fitting.noise import measured_noise
 from workbench.fitting.starts import guessed_states
 from workbench.identification.least_squares import Solution, Unknown, solve
-from workbench.identification.result import Curve, Identified, Procedure, estimated, unfit
+from workbench.identification.result import Curve, Identified, Procedure, complete, estimated, unfit
 from workbench.identification.runs import outputs_under
 from workbench.parts import Body
 from workbench.plant import Plant
@@ -52,6 +52,7 @@ def dead_zone(rig: Rig, recordings: Sequence[Recording]) -> DeadZoneLimits:
     InputError
         If the plant is no tank behind a valve, or a recording no slow sweep through both limits.
     """
+    complete(recordings)
     plant = rig.fit_for(recordings[0]).lean(keep=[_zone(rig.plant).name])
     zone, valve = _zone(plant), _valve(plant)
     for each in recordings:

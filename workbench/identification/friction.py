@@ -27,7 +27,15 @@ from workbench.effect import Conditions
 from workbench.effects import BristleFriction, StribeckFriction
 from workbench.errors import InputError, Message
 from workbench.identification.least_squares import Solution, Unknown, solve
-from workbench.identification.result import Curve, Estimate, Identified, Procedure, estimated, unfit
+from workbench.identification.result import (
+    Curve,
+    Estimate,
+    Identified,
+    Procedure,
+    complete,
+    estimated,
+    unfit,
+)
 from workbench.identification.sliding import (
     BreakAway,
     SteadyRun,
@@ -81,6 +89,7 @@ def friction(rig: Rig, recordings: Sequence[Recording]) -> FrictionMap:
         If the plant has no such friction, a recording holds neither a steady run nor a
         break-away, or one direction has fewer than two runs.
     """
+    complete(recordings)
     plant = rig.fit_for(recordings[0])
     effect = _friction(plant)
     runs: list[SteadyRun] = []

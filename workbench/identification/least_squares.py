@@ -51,7 +51,7 @@ def solve(
     Raises
     ------
     ArithmeticError
-        If the residuals are not finite at the start.
+        If the residuals are not finite at the start, or the search does not come to an end.
     """
     from scipy.optimize import least_squares
 
@@ -85,6 +85,8 @@ def solve(
         bounds=bounds,
         max_nfev=MOST_EVALUATIONS,
     )
+    if not found.success:
+        raise ArithmeticError(f"least squares did not converge in {MOST_EVALUATIONS} evaluations")
     left = found.fun[: len(found.fun) - len(start)]
     worth = max(len(left) - len(start), 1)
     size = max(float(left @ left) / worth, noise**2) * correlation_samples(left)

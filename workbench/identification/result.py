@@ -11,6 +11,7 @@ import numpy as np
 from workbench.errors import InputError, Message
 from workbench.recording import Recording
 from workbench.rig import Rig
+from workbench.units import public_name
 
 
 @dataclass(frozen=True)
@@ -112,6 +113,29 @@ class Procedure:
     manoeuvre: str
     source: str
     run: Callable[[Rig, Sequence[Recording]], Identified]
+
+
+def complete(recordings: Iterable[Recording]) -> None:
+    """Refuse recordings with missing samples: the procedures average and count neighbours.
+
+    Raises
+    ------
+    InputError
+        With every channel that misses some, and the time of the first.
+    """
+    messages = [
+        Message(
+            f"{public_name(name)} misses {missing.sum()} of {len(missing)} samples, the first at "
+            f"{each.sample_time_s * int(missing.argmax()):.4g} s",
+            expected="a recording without holes",
+            file=each.source or each.name,
+        )
+        for each in recordings
+        for name, missing in ((n, ~np.isfinite(v)) for n, v in each.channels.items())
+        if missing.any()
+    ]
+    if messages:
+        raise InputError(*messages)
 
 
 def unfit(recording: Recording, what: str, expected: str) -> InputError:

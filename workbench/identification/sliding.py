@@ -78,7 +78,7 @@ def motion(plant: Plant, friction: StribeckFriction, recording: Recording) -> Mo
         if kind == "Force" and balance == body and member != friction.name
     ]
     pushing = ca.Function("pushing", [*model.symbols], [sum(others)]).map(len(recording))
-    mass = next(part.mass_kg for part in plant.parts if isinstance(part, Body))
+    mass = next(p.mass_kg for p in plant.parts if isinstance(p, Body) and p.name == body)
     force = pushing(x, u, d, plant.nominal[2]).full().ravel()
     return Motion(dt, position, seen[f"{body}.velocity_m_s"], force, float(mass))
 

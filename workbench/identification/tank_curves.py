@@ -30,7 +30,15 @@ from workbench.errors import InputError, Message
 from workbench.fitting.noise import measured_noise
 from workbench.fitting.starts import guessed_states
 from workbench.identification.least_squares import Solution, Unknown, solve
-from workbench.identification.result import Curve, Estimate, Identified, Procedure, estimated, unfit
+from workbench.identification.result import (
+    Curve,
+    Estimate,
+    Identified,
+    Procedure,
+    complete,
+    estimated,
+    unfit,
+)
 from workbench.identification.runs import outputs_under
 from workbench.parts import Body
 from workbench.plant import Plant
@@ -116,6 +124,7 @@ def tank_curves(
         If the plant is no tank behind a valve, or a piece is no curve: valve closed, then one
         constant command.
     """
+    complete(recordings)
     plant = _tank(rig, recordings[0])
     pieces = [_piece(plant, piece) for each in recordings for piece in each.pieces]
     names = _names(plant)

@@ -33,7 +33,15 @@ from workbench.identification.held_gas import (
     pressed_chamber,
 )
 from workbench.identification.least_squares import Solution, Unknown, solve
-from workbench.identification.result import Curve, Estimate, Identified, Procedure, estimated, unfit
+from workbench.identification.result import (
+    Curve,
+    Estimate,
+    Identified,
+    Procedure,
+    complete,
+    estimated,
+    unfit,
+)
 from workbench.identification.runs import outputs_under
 from workbench.parts import Chamber
 from workbench.plant import Plant
@@ -71,6 +79,7 @@ def wall_heat(rig: Rig, recordings: Sequence[Recording]) -> WallHeatFit:
     InputError
         If a recording holds no decay after a push, or one too short or too small.
     """
+    complete(recordings)
     plant = rig.fit_for(recordings[0])
     decays = [_decay(plant, each) for each in recordings]
     tops = [_exponential(each) for each in decays]
