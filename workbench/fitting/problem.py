@@ -104,7 +104,7 @@ def improved_base(problem: Problem, fits: Sequence[Fit]) -> Problem | None:
     best = points_costs(base.windows, base.unknowns, points).best if points else None
     if not best or base.cost - best.cost < LEAST_IMPROVEMENT * problem.misfit:
         return None
-    better = fit_windows(base.windows, base.unknowns, best.point, ITERATIONS)
+    better = fit_windows(base.windows, base.unknowns, best, ITERATIONS)
     held_out = problem.base_validation
     if held_out:
         held_out = refit_starts(held_out.windows, better.plant.values, held_out)
