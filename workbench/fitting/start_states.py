@@ -21,14 +21,15 @@ def refit_starts(
     """Only the start states move: how well a plant with given values predicts a recording.
 
     ``near`` is a fit of a plant with fewer effects, or other values, on the same windows: where
-    to begin.
+    to begin, and where the states are the same with its derivatives.
     """
     nothing = Unknowns((), *(np.zeros(0) for _ in range(5)), held=values or {})
     if near is None:
         return fit_windows(windows, nothing, iterations=iterations)
     point = Point(np.zeros(0), carried(near.point.starts, near.windows, windows))
     start, at = points_costs(windows, nothing, [point]).best, None
-    if near.windows is windows:
+    states, theirs = (list(each.plant.state_list) for each in (windows, near.windows))
+    if near.windows.scale is windows.scale and theirs == states:
         at = seen_at(windows, near.derivatives, point, start.residual)
     return fit_windows(windows, nothing, start, iterations, at)
 
