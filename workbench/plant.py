@@ -99,8 +99,11 @@ class Plant:
         for name, value in values.items():
             member, _, parameter = name.rpartition(".")
             changes[member][parameter] = value
-        parts = tuple(replace(part, **changes.get(part.name, {})) for part in self.parts)
-        effects = tuple(replace(e, **changes.get(e.name, {})) for e in self.effects)
+
+        def changed(member: Any) -> Any:  # the others stay the same objects: many plants are made
+            return replace(member, **changes[member.name]) if member.name in changes else member
+
+        parts, effects = (tuple(map(changed, group)) for group in (self.parts, self.effects))
         return replace(self, parts=parts, effects=effects)
 
     def with_measured_input(self, *names: str) -> Plant:

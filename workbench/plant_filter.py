@@ -24,6 +24,7 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
+from workbench.compiled import compiled
 from workbench.effect import Effect
 from workbench.effects.bristle_friction import BristleFriction
 from workbench.plant import Plant, require
@@ -246,15 +247,15 @@ class PlantFilter:
 
     @cached_property
     def _step(self) -> ca.Function:
-        """(x, u, d, (p, w)) -> x one sample later."""
+        """(x, u, d, (p, w)) -> x one sample later, as machine code where there is a compiler."""
         model, dt = self.plant.model, self.sample_time_s
         if not self.unknown_inputs:
-            return model.step(dt)
+            return model.compiled_step(dt)
         x, u, d, p = model.symbols
         w = ca.SX.sym("w", len(self.unknown_inputs))
         rates = ca.substitute(model.rates, p, p + ca.DM(self._wandering) @ w)
         rates += ca.DM(self._entering) @ w
-        return controlled_step((x, u, d, ca.vertcat(p, w)), rates, dt, model.tolerances)
+        return compiled(controlled_step((x, u, d, ca.vertcat(p, w)), rates, dt, model.tolerances))
 
 
 def _slides(member: Effect) -> bool:

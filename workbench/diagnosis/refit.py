@@ -15,7 +15,7 @@ from workbench.diagnosis.rough import Rough, windows_for
 from workbench.diagnosis.shifts import Shift
 from workbench.fitting.error_model import OUTLYING
 from workbench.fitting.errors import plain_ratio
-from workbench.fitting.gauss_newton import Fit, best_start, fit_windows
+from workbench.fitting.gauss_newton import Fit, fit_windows, points_costs
 from workbench.fitting.linearised import Point
 from workbench.fitting.posterior import posterior_deviation
 from workbench.fitting.problem import Problem, misfit
@@ -54,7 +54,7 @@ def refit(problem: Problem, begun: Rough) -> Refit:
     base, candidate = problem.base, begun.profile.candidate
     windows, unknowns = begun.fit.windows, begun.fit.unknowns
     names = (candidate.strength, *candidate.forms)
-    start = best_start(windows, unknowns, _probes(begun.fit, names))
+    start = points_costs(windows, unknowns, _probes(begun.fit, names)).best
     fit = fit_windows(windows, unknowns, start, ITERATIONS)
     if fit.cost > base.cost:  # a poor start: go on from the base, where it is absent
         values = {**windows.plant.values, **base.plant.values}

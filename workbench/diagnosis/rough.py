@@ -54,9 +54,10 @@ def rough_fit(problem: Problem, profile: Profile) -> Rough:
     begun = [points_costs(windows, unknowns, points).best for points in started]
     most = WORTH_TRYING * min(each.cost for each in begun)
     tried = []
-    for start in (each.point for each in begun if each.cost <= most):
-        near = (base.windows, base.unknowns)
-        at = None if blind else borrowed(base.derivatives, near, windows, unknowns, start)
+    known = (base.windows, base.unknowns)
+    for start in (each for each in begun if each.cost <= most):
+        lent = (base.derivatives, known, windows, unknowns, start.point, start.residual)
+        at = None if blind else borrowed(*lent)
         tried.append(fit_windows(windows, unknowns, start, ITERATIONS, at))
     fit = min(tried, key=lambda each: each.cost)
     return Rough(profile, fit, (base.cost - fit.cost) / problem.misfit)

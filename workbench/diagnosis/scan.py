@@ -29,7 +29,7 @@ import numpy as np
 from workbench.diagnosis.blind_starts import blind_starts, freed
 from workbench.effect import Parameter
 from workbench.fitting.linearised import Linearised, Normal, Point, linearise, normal_equations
-from workbench.fitting.problem import staged
+from workbench.fitting.problem import staged, stateless
 from workbench.fitting.start_states import carried
 from workbench.fitting.unknowns import Unknowns
 from workbench.fitting.windows import Windows
@@ -156,7 +156,8 @@ def scan(
     """Profiles of all candidates, the one that explains most first.
 
     ``whole`` is the windows' plant with all absent effects in their places.  Candidates with
-    states of their own are run on a plant that has them; the others share one.  ``at`` are the
+    states of their own are run on a plant that has them; the others share one, so that all their
+    sizes run side by side.  ``at`` are the
     derivatives at the point where they are known already.  Every second window is enough to tell
     candidates apart where there are many; drops count as of all.
     """
@@ -167,13 +168,11 @@ def scan(
     metric = metric_at(windows, unknowns, point, at)
     blind = blind_starts(windows.plant, metric.at)
     values = unknowns.values(point.t)
-    groups: dict[tuple[str, ...], list[Candidate]] = {}
-    for candidate in candidates:
-        groups.setdefault(_needed(windows.plant, candidate), []).append(candidate)
+    kept = [effect.name for effect in windows.plant.effects if effect.absent]
     profiles = []
     known = whole.parameters
-    for needed, members in groups.items():
-        richer = windows.with_plant(staged(whole, *needed)) if needed else windows
+    for needed, members in _groups(whole, windows.plant, candidates).items():
+        richer = windows.with_plant(staged(whole, *kept, *needed)) if needed else windows
         starts = carried(point.starts, windows, richer)
         trials = [
             (candidate, change)
@@ -238,6 +237,16 @@ def _profiles(
     return profiles
 
 
-def _needed(plant: Plant, candidate: Candidate) -> tuple[str, ...]:
-    """The members a candidate needs that bring states the plant does not have."""
-    return () if candidate.strength in plant.values else (candidate.member,)
+def _groups(
+    whole: Plant, plant: Plant, candidates: Iterable[Candidate]
+) -> dict[tuple[str, ...], list[Candidate]]:
+    """Candidates that run on one plant, by the members that ``plant`` lacks for them."""
+    candidates, there = list(candidates), plant.values
+    plain = {effect.name for effect in stateless(whole)}
+    missing = (c.member for c in candidates if c.strength not in there and c.member in plain)
+    together = tuple(dict.fromkeys(missing))
+    groups: dict[tuple[str, ...], list[Candidate]] = {(): [], together: []}
+    for each in candidates:
+        own = together if each.member in plain else (each.member,)
+        groups.setdefault(() if each.strength in there else own, []).append(each)
+    return {needed: members for needed, members in groups.items() if members}

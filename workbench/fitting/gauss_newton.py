@@ -78,7 +78,7 @@ class Fit:
 def fit_windows(
     windows: Windows,
     unknowns: Unknowns,
-    start: Point | None = None,
+    start: Point | Cost | None = None,
     iterations: int = 8,
     at: Linearised | None = None,
 ) -> Fit:
@@ -86,14 +86,15 @@ def fit_windows(
 
     Every step is taken only if the cost falls.  As long as steps bring more than 2 %, the next
     uses the same derivatives, corrected by what the step showed: they are the dear part.
-    ``at`` are derivatives to begin with, taken near by, with the residual of the start.
+    ``start`` is a point, or what it costs where it was run already.  ``at`` are derivatives to
+    begin with, taken near by, with the residual of the start.
     """
-    point = start or Point(unknowns.scaled(windows.plant.values), windows.start)
-    now = points_costs(windows, unknowns, [point]).best
+    start = start or Point(unknowns.scaled(windows.plant.values), windows.start)
+    now = start if isinstance(start, Cost) else points_costs(windows, unknowns, [start]).best
     fresh, converged, stale = False, False, at is None
     for _ in range(iterations):
         if stale or at is None:
-            at, fresh = linearise(windows, unknowns, now.point), True
+            at, fresh = linearise(windows, unknowns, now.point, now.residual), True
         found = _stepped(windows, unknowns, at, now)
         fall = (now.cost - found.cost) / max(now.cost, 1e-12)
         now = min(now, found, key=lambda each: each.cost)
@@ -103,7 +104,7 @@ def fit_windows(
         stale, fresh = fall < AGAIN, False
         if not stale:
             at = secant(windows, at, now.point, now.residual)
-    at = at or linearise(windows, unknowns, now.point)
+    at = at or linearise(windows, unknowns, now.point, now.residual)
     at = seen_at(windows, at, now.point, now.residual)
     return Fit(windows, unknowns, now.point, now.chi2, now.cost, converged, at)
 
@@ -147,11 +148,6 @@ def _promised(at: Linearised, unknowns: Unknowns, step: Step) -> float:
     moved_by = at.parameters @ dt + (at.basis @ (at.triangle @ dx.T[:, :, None]))[:, :, 0]
     prior = np.sum(unknowns.precision * (at.point.t + dt) ** 2)
     return float(np.sum((at.residual + moved_by) ** 2) + prior)
-
-
-def best_start(windows: Windows, unknowns: Unknowns, points: list[Point]) -> Point:
-    """The point of least cost, all run in one batch."""
-    return points_costs(windows, unknowns, points).best.point
 
 
 def _damped_steps(

@@ -70,43 +70,44 @@ class Linearised:
         return left.reshape(rows.shape)
 
 
-def linearise(windows: Windows, unknowns: Unknowns, point: Point) -> Linearised:
-    """Residuals and derivatives by one batch of simulations; see :class:`Linearised`."""
+def linearise(
+    windows: Windows, unknowns: Unknowns, point: Point, residual: np.ndarray | None = None
+) -> Linearised:
+    """Residuals and derivatives by one batch of simulations; see :class:`Linearised`.
+
+    ``residual`` is that of the point, (n_y, n_windows, L), where it was run already.
+    """
     n_x, n_p = windows.start.shape[0], len(unknowns)
-    plants = [plant_at(windows, unknowns, point.t)] * (1 + n_x)
-    starts = [point.starts, *(_stepped_start(windows, point, k) for k in range(n_x))]
+    plants = [plant_at(windows, unknowns, point.t)] * n_x
+    starts = [_stepped_start(windows, point, k) for k in range(n_x)]
     starts += [point.starts] * n_p
     h_p = parameter_steps(unknowns, point.t)
     plants += [plant_at(windows, unknowns, point.t + h_p[k] * unit(n_p, k)) for k in range(n_p)]
-    r = windows.residuals(plants, np.array(starts)).transpose(0, 2, 1, 3)
-    n = len(windows)
-    r = r.reshape(len(plants), n, -1)
-    residual = _with_priors(windows, point, r[0])
-    J_x = np.concatenate(
-        [
-            (r[1 : 1 + n_x] - r[0]).transpose(1, 2, 0) / START_STEP,
-            np.broadcast_to(np.eye(n_x), (n, n_x, n_x)),
-        ],
-        axis=1,
-    )
-    J_p = (r[1 + n_x :] - r[0]).transpose(1, 2, 0) / h_p
-    J_p = np.concatenate([J_p, np.zeros((n, n_x, n_p))], axis=1)
-    return Linearised(point, residual, J_p, *_factors(J_x))
+    here = _run_once(windows, unknowns, point) if residual is None else residual
+    n, change = len(windows), windows.residuals(plants, np.array(starts)) - here
+    columns = change.transpose(2, 1, 3, 0).reshape(n, here[:, 0].size, n_x + n_p)
+    own = np.broadcast_to(np.eye(n_x), (n, n_x, n_x))
+    J_x = np.concatenate([columns[:, :, :n_x] / START_STEP, own], axis=1)
+    J_p = np.concatenate([columns[:, :, n_x:] / h_p, np.zeros((n, n_x, n_p))], axis=1)
+    return Linearised(point, _with_priors(windows, point, _rows(here)), J_p, *_factors(J_x))
 
 
-def moved(windows: Windows, unknowns: Unknowns, at: Linearised, point: Point) -> Linearised:
-    """The same derivatives with the residual of another point, which is simulated.
+def _run_once(windows: Windows, unknowns: Unknowns, point: Point) -> np.ndarray:
+    """Weighted residuals of a point, (n_y, n_windows, L)."""
+    return windows.residuals([plant_at(windows, unknowns, point.t)], point.starts)[0]
 
-    ``at`` may belong to other values of the same unknowns, or to a plant with other values.
-    """
-    r = windows.residuals([plant_at(windows, unknowns, point.t)], point.starts)[0]
-    return seen_at(windows, at, point, r)
+
+def _rows(residual: np.ndarray) -> np.ndarray:
+    """Residuals (n_y, n_windows, L) window by window, (n_windows, n_y L)."""
+    return residual.transpose(1, 0, 2).reshape(residual.shape[1], -1)
 
 
 def seen_at(windows: Windows, at: Linearised, point: Point, residual: np.ndarray) -> Linearised:
-    """The same derivatives with the residual (n_y, n_windows, L) of another point."""
-    rows = residual.transpose(1, 0, 2).reshape(len(windows), -1)
-    return replace(at, point=point, residual=_with_priors(windows, point, rows))
+    """The same derivatives with the residual (n_y, n_windows, L) of another point.
+
+    ``at`` may belong to other values of the same unknowns, or to a plant with other values.
+    """
+    return replace(at, point=point, residual=_with_priors(windows, point, _rows(residual)))
 
 
 def secant(windows: Windows, at: Linearised, point: Point, residual: np.ndarray) -> Linearised:
@@ -152,38 +153,38 @@ def borrowed(
     windows: Windows,
     unknowns: Unknowns,
     point: Point,
+    residual: np.ndarray | None = None,
 ) -> Linearised:
     """Derivatives at a point from those near by, with columns of their own for what is new there.
 
     ``near`` belongs to the windows and unknowns ``known``, of a plant with fewer states or effects.
+    ``residual`` is that of the point, (n_y, n_windows, L), where it was run already.
     """
     h, t, n_p = parameter_steps(unknowns, point.t), point.t, len(unknowns)
     ours, theirs = list(windows.plant.state_list), list(known[0].plant.state_list)
     new_p = [k for k, name in enumerate(unknowns.names) if name not in known[1].names]
     new_x = [k for k, name in enumerate(ours) if name not in theirs]
-    plants = [plant_at(windows, unknowns, t)] * (1 + len(new_x))
+    plants = [plant_at(windows, unknowns, t)] * len(new_x)
     plants += [plant_at(windows, unknowns, t + h[k] * unit(n_p, k)) for k in new_p]
-    starts = [point.starts] * len(plants)
-    for row, k in enumerate(new_x, start=1):
-        starts[row] = _stepped_start(windows, point, k)
-    r = windows.residuals(plants, np.array(starts)).transpose(0, 2, 1, 3)
-    r = r.reshape(len(plants), len(windows), -1)
-    n, n_out, n_x = len(windows), r.shape[2], len(ours)
+    starts = [_stepped_start(windows, point, k) for k in new_x] + [point.starts] * len(new_p)
+    here = _run_once(windows, unknowns, point) if residual is None else residual
+    change = [_rows(each - here) for each in windows.residuals(plants, np.array(starts))]
+    n, n_out, n_x = len(windows), here[:, 0].size, len(ours)
     J_x, J_p = np.zeros((n, n_out + n_x, n_x)), np.zeros((n, n_out + n_x, n_p))
     J_x[:, n_out:] = np.eye(n_x)
     before = near.basis @ near.triangle
     for k, name in enumerate(theirs):
         J_x[:, :n_out, ours.index(name)] = before[:, :n_out, k]
-    for row, k in enumerate(new_x, start=1):
-        J_x[:, :n_out, k] = (r[row] - r[0]) / START_STEP
+    for k, column in zip(new_x, change, strict=False):
+        J_x[:, :n_out, k] = column / START_STEP
     for k, name in enumerate(unknowns.names):
         if name in known[1].names:
             j = known[1].names.index(name)
             unit_ratio = unknowns.scale[k] / known[1].scale[j]
             J_p[:, :n_out, k] = unit_ratio * near.parameters[:, :n_out, j]
-    for row, k in enumerate(new_p, start=1 + len(new_x)):
-        J_p[:, :n_out, k] = (r[row] - r[0]) / h[k]
-    return Linearised(point, _with_priors(windows, point, r[0]), J_p, *_factors(J_x))
+    for k, column in zip(new_p, change[len(new_x) :], strict=True):
+        J_p[:, :n_out, k] = column / h[k]
+    return Linearised(point, _with_priors(windows, point, _rows(here)), J_p, *_factors(J_x))
 
 
 def _stepped_start(windows: Windows, point: Point, k: int) -> np.ndarray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
+from workbench.effect import Effect
 from workbench.fitting.gauss_newton import Fit, fit_windows, points_costs
 from workbench.fitting.linearised import Linearised, Point
 from workbench.fitting.noise import measured_noise
@@ -80,12 +81,17 @@ def misfit(fit: Fit) -> float:
 
 
 def staged(whole: Plant, *members: str) -> Plant:
-    """The whole plant without the absent effects that bring states, but for the named members.
+    """The whole plant without what is absent, but for the named members and what is tolerated.
 
-    Absent effects without states cost next to nothing, and so all their sizes run on one plant.
+    What is absent adds nothing, but all of it together would take a third of the time of a step.
     """
-    plain = [effect.name for effect in whole.effects if not tuple(effect.states())]
-    return whole.lean(keep=[*plain, *members])
+    tolerated = [e.name for e in stateless(whole) if any(cause.tolerated for cause in e.causes)]
+    return whole.lean(keep=[*tolerated, *members])
+
+
+def stateless(plant: Plant) -> list[Effect]:
+    """The effects of a plant that bring no states."""
+    return [effect for effect in plant.effects if not tuple(effect.states())]
 
 
 def improved_base(problem: Problem, fits: Sequence[Fit]) -> Problem | None:
@@ -105,7 +111,7 @@ def improved_base(problem: Problem, fits: Sequence[Fit]) -> Problem | None:
     best = points_costs(base.windows, base.unknowns, points).best if points else None
     if not best or base.cost - best.cost < LEAST_IMPROVEMENT * problem.misfit:
         return None
-    better = fit_windows(base.windows, base.unknowns, best.point, ITERATIONS)
+    better = fit_windows(base.windows, base.unknowns, best, ITERATIONS)
     held_out = problem.base_validation
     if held_out:
         held_out = refit_starts(held_out.windows, better.plant.values, held_out)

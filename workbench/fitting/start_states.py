@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from workbench.fitting.gauss_newton import Fit, fit_windows
-from workbench.fitting.linearised import Point, moved
+from workbench.fitting.gauss_newton import Fit, fit_windows, points_costs
+from workbench.fitting.linearised import Point, seen_at
 from workbench.fitting.unknowns import Unknowns
 from workbench.fitting.windows import Windows
 
@@ -21,14 +21,16 @@ def refit_starts(
     """Only the start states move: how well a plant with given values predicts a recording.
 
     ``near`` is a fit of a plant with fewer effects, or other values, on the same windows: where
-    to begin.
+    to begin, and where the states are the same with its derivatives.
     """
     nothing = Unknowns((), *(np.zeros(0) for _ in range(5)), held=values or {})
-    start, at = None, None
-    if near is not None:
-        start = Point(np.zeros(0), carried(near.point.starts, near.windows, windows))
-        at = near.derivatives if near.windows is windows else None
-        at = moved(windows, nothing, at, start) if at else None
+    if near is None:
+        return fit_windows(windows, nothing, iterations=iterations)
+    point = Point(np.zeros(0), carried(near.point.starts, near.windows, windows))
+    start, at = points_costs(windows, nothing, [point]).best, None
+    states, theirs = (list(each.plant.state_list) for each in (windows, near.windows))
+    if near.windows.scale is windows.scale and theirs == states:
+        at = seen_at(windows, near.derivatives, point, start.residual)
     return fit_windows(windows, nothing, start, iterations, at)
 
 

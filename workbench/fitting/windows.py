@@ -166,6 +166,8 @@ class Windows:
         (n_plants, n_x, n_windows) or (n_x, n_windows).
         """
         plants = list(plants)
+        if not plants:
+            return np.zeros((0, *self.measured.shape))
         starts = np.broadcast_to(starts, (len(plants), *self.start.shape))
         fed = [self._inputs(plant) for plant in plants]
         u, d = (np.hstack([each[k] for each in fed]) for k in (0, 1))
