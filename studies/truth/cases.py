@@ -28,8 +28,16 @@ def read_cases(path: Path = STORED) -> dict[tuple[str | None, int], Case]:
 
 def write_cases(cases: Iterable[Case], path: Path) -> None:
     """Store cases, one per line."""
-    lines = ",\n".join(json.dumps(asdict(case)) for case in cases)
+    lines = ",\n".join(json.dumps(_numbers(case)) for case in cases)
     path.write_text(f"[\n{lines}\n]\n")
+
+
+def _numbers(case: Case) -> dict:
+    """All numbers of a case; the plant that a case has by default goes without saying."""
+    numbers = asdict(case)
+    if case.plant == Case.plant:
+        del numbers["plant"]
+    return numbers
 
 
 def _case(numbers: dict) -> Case:
