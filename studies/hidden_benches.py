@@ -12,7 +12,7 @@ import numpy as np
 
 from studies.truth import plants
 from studies.truth.case import Case
-from studies.truth.plants import Truth
+from studies.truth.plants import Table, Truth
 from studies.truth.soft_joint_run import SAMPLE_TIME_S as SOFT_JOINT_SAMPLE_TIME_S
 from workbench.recording import Recording
 from workbench.rig import Rig, default_rig
@@ -31,6 +31,8 @@ class Bench:
     always_there
         Small differences that every truth has and the catalogue can name: naming one of them where
         nothing is hidden is right.
+    laws
+        Balances, as a diagnosis names them, in which a law outside the catalogue acts.
     places
         Catalogue's name of a hidden effect where it is not the truth's.
     sample_time_s
@@ -40,6 +42,7 @@ class Bench:
     truth: Truth
     channels: Mapping[str, tuple[str, float]]
     always_there: tuple[str, ...]
+    laws: Mapping[str, tuple[str, ...]]
     places: Mapping[str, str] = field(default_factory=dict)
     sample_time_s: float = 1e-3
 
@@ -54,16 +57,16 @@ class Bench:
             return None
         return self.places.get(case.hidden, case.hidden)
 
-    def user_rig(self, case: Case) -> Rig:
-        """The rig of a user who does not know of the hidden effect."""
+    def user_rig(self, *cases: Case) -> Rig:
+        """The rig of a user who does not know of what these cases hide."""
         rig = default_rig(self.plant)
-        name = self.public_name(case)
-        if name is None:
-            return rig
-        candidate = rig.plant.candidates[name]
-        return replace(rig, plant=rig.plant.at_null(candidate), removed=(name,))
+        for name in filter(None, map(self.public_name, cases)):
+            candidate = rig.plant.candidates[name]
+            plant, removed = rig.plant.at_null(candidate), (*rig.removed, name)
+            rig = replace(rig, plant=plant, removed=removed)
+        return rig
 
-    def recording(self, table: Mapping[str, np.ndarray], name: str) -> Recording:
+    def recording(self, table: Table, name: str) -> Recording:
         """A recorded table in SI units and the plant's signals."""
         channels = {
             public: np.asarray(table[column]) * factor
@@ -71,6 +74,11 @@ class Bench:
             if column in table
         }
         return Recording(name, self.sample_time_s, channels, source="studies/truth")
+
+    def recorded(self, name: str, tables: tuple[Table, Table]) -> tuple[Recording, Recording]:
+        """Training and validation."""
+        train, held_out = tables
+        return self.recording(train, f"{name} training"), self.recording(held_out, f"{name} other")
 
 
 SERVO_DRIVE = Bench(
@@ -83,6 +91,14 @@ SERVO_DRIVE = Bench(
         "supply_bar": ("supply.pressure_pa", 1e5),
     },
     always_there=("valve_lag", "command_delay", "sensor_lag", "friction_position"),
+    laws={
+        "quadratic_drag": ("slide.momentum",),
+        "sagging_cable": ("slide.momentum",),
+        "sticky_spot": ("slide.momentum",),
+        "magnetic_catch": ("slide.momentum",),
+        "sliding_leak": ("chamber_a.mass",),
+        "purge_flow": ("chamber_b.mass",),
+    },
     places={
         "chamber_leak": "chamber_leak@chamber_a",
         "chamber_leak_b": "chamber_leak@chamber_b",
@@ -107,6 +123,7 @@ CRR_RIG = Bench(
         "wall_heat",
         "area_shape",
     ),
+    laws={"quadratic_drag": ("rod.momentum",)},
     places={
         "chamber_leak": "chamber_leak@cap",
         "sensor_offset": "sensor_offset@cap.pressure",
@@ -127,6 +144,7 @@ SOFT_JOINT = Bench(
         "volume_expansion",
         "bellows_creep",
     ),
+    laws={"joint_motion": ("bellows.mass", "bellows.energy")},  # of a volume that changes
     places={"sensor_offset": "sensor_offset@bellows.pressure"},
     sample_time_s=SOFT_JOINT_SAMPLE_TIME_S,
 )
@@ -141,6 +159,7 @@ GEARBOX = Bench(
         "supply_bar": ("supply.pressure_pa", 1e5),
     },
     always_there=("sensor_lag", "command_delay", "friction_position"),
+    laws={"quadratic_drag": ("main_piston.momentum",)},
     places={
         "coulomb_friction": "coulomb_friction@main_piston",
         "viscous_friction": "viscous_friction@main_piston",

@@ -1,10 +1,10 @@
 """Cases whose hidden effect can be seen: the last rule of the draw, which needs the model.
 
-A size is drawn log-uniform in 15 to 60 % of typical, such that the refit with the true effect
-removes more than 30 % of the misfit that is left without it.  Below that the small differences of
-the truth are what a recording shows.  The truth itself knows no model, so the rule stands here and
-not in ``studies/truth``; the rule there (differences below 20 % of the hidden effect, in open-loop
-windows) holds again after each redraw.
+The first twelve effects have sizes drawn log-uniform in 15 to 60 % of typical, such that
+the refit with the true effect removes more than 30 % of the misfit that is left without it.  Below
+that the small differences of the truth are what a recording shows.  The truth itself knows no
+model, so the rule stands here and not in ``studies/truth``; the rule there (differences below 20 %
+of the hidden effect, in open-loop windows) holds again after each redraw.
 
 ``python -m studies.hidden_cases spool_leak:2`` measures stored cases, draws those that break the
 rule again, and stores them (about ten minutes).

@@ -9,8 +9,11 @@ from functools import cache
 
 import pytest
 
+from studies.hidden_answers import row_of
 from studies.hidden_benches import SERVO_DRIVE
-from studies.hidden_effects import answer, confusion, recordings
+from studies.hidden_effects import answer, recordings
+from studies.hidden_rows import Kind, table
+from studies.hidden_tasks import Task
 from studies.truth.cases import read_cases
 from studies.truth.draw import FIRST
 from workbench.diagnosis.result import DecidedBy, Verdict
@@ -30,13 +33,17 @@ def diagnosed(hidden, group=(*ALWAYS, None)):
     return answer(CASES[hidden, SEED], *made(group)[hidden])
 
 
+def said(found):
+    return table([row_of(Task(Kind.EFFECT, (each.case,)), each) for each in found])
+
+
 @pytest.mark.parametrize("hidden", ALWAYS)
 def test_a_hidden_effect_comes_first_with_its_size(hidden):
     found = diagnosed(hidden)
     leader = found.diagnosis.ranking[0]
     (size,) = leader.size.values()
 
-    assert leader.candidate.name == SERVO_DRIVE.public_name(found.case), confusion([found])
+    assert leader.candidate.name == SERVO_DRIVE.public_name(found.case), said([found])
     assert found.diagnosis.verdict in (Verdict.FOUND, Verdict.TIE)
     assert size.value == pytest.approx(found.case.size, rel=0.25)
     assert leader.drop_validation > 0.2
@@ -50,8 +57,8 @@ def test_of_twelve_hidden_effects_ten_come_first_and_all_at_least_in_a_printed_t
     found = [diagnosed(hidden, FIRST) for hidden in FIRST]
     first = [each for each in found if each.place == 1]
 
-    assert len(first) >= 10, confusion(found)
-    assert all(each.right for each in found), confusion(found)
+    assert len(first) >= 10, said(found)
+    assert all(each.right for each in found), said(found)
     assert all(len(each.diagnosis.ranking[0].tied_with) <= 2 for each in found)
 
 

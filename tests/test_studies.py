@@ -1,19 +1,25 @@
 """Studies: what is kept of long work, what the rows of the hidden-effect study say, the command."""
 
 import json
+from dataclasses import replace
 
 import pytest
 from typer.testing import CliRunner
 
 from studies.command_line import app
-from studies.hidden_study import Row, outcome
+from studies.hidden_answers import counted, widened
+from studies.hidden_benches import BENCHES, SERVO_DRIVE
+from studies.hidden_claims import outcome
+from studies.hidden_rows import Kind, Row, plain, row_again
+from studies.hidden_tasks import tasks
 from studies.kept import Kept
 from studies.registry import STUDIES
 from studies.running import run_study
 from studies.study import Claim, Extent, Outcome, Study
+from workbench.rig import default_rig
 
 
-def row(hidden="coulomb_friction", first=None, place=1, own_drop=0.9, kind="effect", **other):
+def row(hidden="coulomb_friction", first=None, place=1, own_drop=0.9, kind=Kind.EFFECT, **other):
     """A right answer with a strong effect, unless told otherwise."""
     numbers = dict(
         plant="servo_drive", hidden=hidden, seed=1, kind=kind, size=10.0, first=first or hidden,
@@ -24,7 +30,7 @@ def row(hidden="coulomb_friction", first=None, place=1, own_drop=0.9, kind="effe
 
 
 def held(found):
-    return {claim.claim.partition(",")[0]: claim.holds for claim in found.claims}
+    return {claim.claim.partition(", at")[0]: claim.holds for claim in found.claims}
 
 
 def test_rows_survive_and_a_line_cut_short_is_left_out(tmp_path):
@@ -42,7 +48,7 @@ def test_rows_survive_and_a_line_cut_short_is_left_out(tmp_path):
 
 
 def test_a_study_of_right_answers_holds_its_claims():
-    found = outcome([row(), row("stiction"), row("nothing", "x", 0, kind="nothing", right=True)])
+    found = outcome([row(), row("stiction"), row("nothing", "x", 0, kind=Kind.NOTHING, right=True)])
 
     assert all(held(found).values())
     assert "coulomb_friction" in found.text
@@ -67,9 +73,106 @@ def test_an_effect_that_hardly_shows_counts_among_all_only():
 
 
 def test_a_false_name_where_nothing_is_hidden_fails():
-    said = held(outcome([row(), row("nothing", "stiction", 0, kind="nothing", right=False)]))
+    said = held(outcome([row(), row("nothing", "stiction", 0, kind=Kind.NOTHING, right=False)]))
 
-    assert not said["no false name"]
+    assert not said["no false name where nothing is hidden"]
+
+
+def test_a_pair_counts_by_its_effects_and_fails_by_a_wrong_one():
+    pair = row("a + b", "a + b", 0, kind=Kind.PAIR, accepted=2, right=True)
+    half = [replace(pair, accepted=1)] * 2
+    well, badly = held(outcome([pair] * 8 + half)), held(outcome([pair] * 8 + half * 3))
+    named = held(outcome([pair, replace(pair, wrong=1)]))
+
+    assert well["effects of pairs found"]
+    assert not badly["effects of pairs found"]
+    assert well["pairs without a wrong effect"]
+    assert not named["pairs without a wrong effect"]
+
+
+def test_what_was_accepted_counts_for_one_hidden_effect_of_its_tie():
+    hidden = ("constant_force", "valve_lag")
+    tied = {"sensor_offset": ("constant_force",), "valve_offset": ("constant_force",)}
+
+    def of(*kept):
+        return counted(kept, tied, hidden, SERVO_DRIVE)
+
+    assert of(*hidden) == (2, 0)
+    assert of("sensor_offset") == (1, 0)
+    assert of("sensor_offset", "valve_offset") == (1, 1)
+    assert of("sensor_offset", "constant_force") == (1, 1)
+    assert of("valve_lag", "sensor_lag@slide.position") == (
+        1,
+        0,
+    )  # a small difference of every truth
+    assert of("stiction") == (0, 1)
+
+
+def test_one_law_of_six_may_be_missed_but_not_its_balance():
+    law = row("a law", "viscous_friction", 0, kind=Kind.LAW, right=True, balance_right=True)
+    missed = replace(law, right=False)
+    elsewhere = replace(law, balance_right=False)
+
+    assert all(held(outcome([law] * 5 + [missed])).values())
+    assert not held(outcome([law] * 4 + [missed] * 2))["laws called outside the catalogue"]
+    assert not held(outcome([law] * 5 + [elsewhere]))["laws in the right balance"]
+
+
+def test_other_priors_are_held_against_the_answer_of_the_same_case():
+    effects = [row(seed=k) for k in range(10)]
+    wide = [replace(each, kind=Kind.WIDTH) for each in effects]
+    other = [replace(wide[0], first="stiction")]
+    claim = "the same first name with priors three times as wide"
+
+    assert held(outcome(effects + wide[1:] + other))[claim]
+    assert not held(outcome(effects + wide[2:] + other * 2))[claim]
+    assert claim not in held(outcome(wide))
+
+
+def test_weak_recordings_are_claimed_apart_from_effects():
+    weak = row("valve_lag", "stiction", 9, kind=Kind.WEAK, right=True)
+    said = held(outcome([weak] * 5 + [replace(weak, right=False)]))
+
+    assert said == {"recordings called too weak": True}
+
+
+def test_a_row_survives_as_json():
+    kept = row(own_drop=float("nan"), kind=Kind.WEAK)
+    again = row_again(json.loads(json.dumps({"key": "a", **plain(kept)}, allow_nan=False)))
+
+    assert repr(again) == repr(kept)
+
+
+def test_the_full_grid_is_what_the_issue_asks_for():
+    full, quick = tasks(Extent.FULL), tasks(Extent.QUICK)
+
+    def count(kind, plant="servo_drive"):
+        found = [t for t in full if t.kind is kind and t.plant == plant]
+        return len({t.hidden for t in found}), len(found)
+
+    assert count(Kind.EFFECT) >= (20, 60)
+    for plant, least in (("crr_rig", (8, 16)), ("gearbox", (6, 12)), ("soft_joint", (6, 12))):
+        assert count(Kind.EFFECT, plant) >= least
+    assert count(Kind.PAIR)[1] == count(Kind.NOTHING)[1] == 10
+    assert count(Kind.LAW)[0] == count(Kind.WEAK)[0] == 6
+    assert count(Kind.WIDTH) == (count(Kind.EFFECT)[0],) * 2
+    assert {t.seed for t in quick} == {1}
+    assert {t.kind for t in quick} == set(Kind) - {Kind.WIDTH}
+    assert len({t.key for t in full}) == len(full)
+
+
+def test_every_law_outside_has_its_balance():
+    for bench in BENCHES.values():
+        assert set(bench.laws) == set(bench.truth.outside_catalogue)
+
+
+def test_wider_priors_are_wider_by_that_much():
+    rig = default_rig("servo_drive")
+    wide = widened(rig, 3.0)
+
+    for name in ("slide.mass_kg", "valve_dead_zone.centre_v", "supply.pressure_pa"):
+        assert wide.standard_deviation(name) == 3.0 * rig.standard_deviation(name) > 0.0
+    assert wide.plant is rig.plant
 
 
 @pytest.fixture

@@ -55,6 +55,8 @@ def _chamber_constants(p: d.Drive, step_s: float) -> dict:
         wall_gain=step_s * p.wall_k_per_j,
         asymmetric=bool(np.any(p.discharge_asymmetry != 0)),
         droops=bool(np.any(p.tank_per_m3 > 0)),
+        slides_open=bool(np.any(p.sliding_leak_m2_s_m)),
+        purged=bool(np.any(p.purge_kg_s)),
         walls=bool(np.any(p.wall_k_per_j > 0)),
         tank_gain=step_s * d.KAPPA * d.GAS_CONSTANT_J_KG_K * p.supply_temperature_k * p.tank_per_m3,
     )
@@ -75,6 +77,9 @@ def _mechanics_constants(p: d.Drive, step_s: float) -> dict:
         stiff=d.BRISTLE_STIFFNESS_N_M + d.BRISTLE_DAMPING_N_S_M / step_s,
         damp=d.BRISTLE_DAMPING_N_S_M / step_s,
         presliding_gain=1 / (1 - p.presliding_share),
+        lawful=bool(
+            np.any([p.quadratic_drag_n_s2_m2, p.sagging_cable_n, p.spot_drag_n_s_m, p.catch_n])
+        ),
     )
 
 

@@ -44,8 +44,14 @@ EFFECTS = {
     "sensor_scale": Hidden(("position_scale",), 0.05, signed=True),
     "chamber_leak_b": Hidden(("chamber_b_leak_m2",), 3e-7),
     "quadratic_drag": Hidden(("quadratic_drag_n_s2_m2",), 400.0),
+    "sagging_cable": Hidden(("sagging_cable_n",), 60.0),
+    "sticky_spot": Hidden(("spot_drag_n_s_m",), 200.0),
+    "magnetic_catch": Hidden(("catch_n",), 60.0),
+    "sliding_leak": Hidden(("sliding_leak_m2_s_m",), 1e-6),
+    "purge_flow": Hidden(("purge_kg_s",), 3e-4),
 }
-OUTSIDE_CATALOGUE = ("quadratic_drag",)
+AT_A_SPOT = ("sticky_spot", "magnetic_catch")
+OUTSIDE_CATALOGUE = ("quadratic_drag", "sagging_cable", *AT_A_SPOT, "sliding_leak", "purge_flow")
 HIDDEN = tuple(name for name in EFFECTS if name not in OUTSIDE_CATALOGUE)
 FIRST = HIDDEN[:12]  # those of the first test bench, which drew nothing below 15 %
 LARGEST_SHARE = 0.60
@@ -59,7 +65,8 @@ def draw(hidden: str | None, seed: int) -> Case:
     if hidden is not None and hidden not in EFFECTS:
         raise KeyError(f"truth: {hidden} is not a hidden effect; there are {', '.join(EFFECTS)}")
     rng = generator(hidden, seed, "draw")
-    return Case(hidden, seed, draw_size(hidden, rng), _differences(hidden, rng), _accessories(rng))
+    size, differences = draw_size(hidden, rng), _differences(hidden, rng)
+    return Case(hidden, seed, size, differences, _accessories(hidden, rng))
 
 
 def draw_size(hidden: str | None, rng: np.random.Generator) -> float:
@@ -103,13 +110,17 @@ def _differences(hidden: str | None, rng: np.random.Generator) -> tuple[Differen
     return tuple(Difference(f, float(c)) for f, c in change.items() if f not in own)
 
 
-def _accessories(rng: np.random.Generator) -> tuple[tuple[str, float], ...]:
-    return (
+def _accessories(hidden: str | None, rng: np.random.Generator) -> tuple[tuple[str, float], ...]:
+    always = (
         ("valve_damping", float(rng.uniform(0.7, 1.0))),
         ("wall_loss_w_k", float(rng.uniform(0.3, 1.0))),
         ("friction_wavelength_m", float(rng.uniform(0.02, 0.10))),
         ("friction_phase_rad", float(rng.uniform(0, 2 * np.pi))),
     )
+    if hidden not in AT_A_SPOT:
+        return always
+    spot = (float(rng.uniform(0.10, 0.19)), float(rng.uniform(0.02, 0.04)))
+    return (*always, ("spot_m", spot[0]), ("spot_width_m", spot[1]))
 
 
 def drive_of(

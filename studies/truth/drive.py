@@ -41,6 +41,7 @@ class Drive:
     `play_share` and `stuck_band_share` are shares of the command's range: the spool moves once the
     command is further away than the play, and stays shut below centre within the band.
     The spring pulls to mid-stroke. `position_scale` is the position sensor's error of gain.
+    Laws that no catalogue has, from `quadratic_drag_n_s2_m2` on, are written down in `laws`.
     `tank_per_m3` is the reciprocal of the tank volume; 0 is an ideal supply.
     """
 
@@ -84,12 +85,19 @@ class Drive:
     friction_wavelength_m: float = 0.05
     friction_phase_rad: float = 0.0
     presliding_share: float = 0.9
-    quadratic_drag_n_s2_m2: float = 0.0
     constant_force_n: float = 0.0
     spring_n_m: float = 0.0
     pressure_lag_s: float = 0.0
     pressure_a_offset_pa: float = 0.0
     position_scale: float = 0.0
+    quadratic_drag_n_s2_m2: float = 0.0
+    sagging_cable_n: float = 0.0
+    spot_drag_n_s_m: float = 0.0
+    catch_n: float = 0.0
+    spot_m: float = 0.145
+    spot_width_m: float = 0.03
+    sliding_leak_m2_s_m: float = 0.0
+    purge_kg_s: float = 0.0
 
 
 @dataclass(frozen=True)

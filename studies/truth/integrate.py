@@ -3,11 +3,13 @@
 Per step of 20 microseconds, for all columns at once:
 
     valve       spool in volt, implicit Euler, computed for a whole millisecond beforehand
-    mechanics   M (v1 - v0)/dt = S (p_a - p_b) + F_e - F_f(z1, v1) - c |v0| v1
+    mechanics   M (v1 - v0)/dt = S (p_a - p_b) + F_e - F_f(z1, v1) - c(y0, |v0|) v1
                 z1 = (z0 + dt v1) / (1 + dt alpha sigma_0 |v0| / g),  linear in v1, so no iteration
     chambers    dU = (c_p sum mdot T + Q) dt - p S dy,  dm = sum mdot dt,  p = (kappa-1) U / V
     walls       C_w dT_w = (h (T_amb - T_w) - Q) dt
     supply      V_t dp_s = kappa R T_s (G_r (p_set - p_s) - sum mdot_in) dt
+
+Laws of `laws` add to F_e and c, to the leak of chamber a and to the flow into b.
 
 Source: physics.md 1.1-1.4, 2.4, 6 (supply_droop, wall_temperature), 8.1.
 """
@@ -17,6 +19,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from studies.truth import drive as d
+from studies.truth import laws
 from studies.truth.bench import SUBSTEPS, Bench, bench
 from studies.truth.restriction import CELLS, ROW_OFFSET, tables
 
@@ -96,6 +99,8 @@ def _open_lands(b: Bench, spool_v: np.ndarray) -> None:
 def _flows(b: Bench, s: SimpleNamespace, area: np.ndarray) -> None:
     """Mass flow and enthalpy flow over c_p into the chambers, rows as in `restriction`."""
     w = b.buffer
+    if b.constant.slides_open:
+        area[4, 0] = b.drive.chamber_a_leak_m2 + b.drive.sliding_leak_m2_s_m * np.abs(s.velocity)
     w.outside_pa[5] = s.pressure[::-1]
     w.outside_k[5] = s.temperature[::-1]
     if b.constant.droops:
@@ -140,7 +145,10 @@ def _mechanics(b: Bench, s: SimpleNamespace, stops: bool) -> None:
     force -= p.spring_n_m * (s.position - d.STROKE_M / 2)
     if stops:
         force += _stop_force(s.position, v)
-    drag = viscous + p.quadratic_drag_n_s2_m2 * speed
+    drag = viscous
+    if c.lawful:
+        force += laws.force_n(p, s.position)
+        drag = viscous + laws.drag_n_s_m(p, s.position, speed)
     s.velocity = (c.inertia * v + force - (stiff - c.damp) * z) / (c.inertia + stiff * dt + drag)
     s.bristle = (z + dt * s.velocity) / slip
     s.position = s.position + dt * s.velocity
@@ -167,6 +175,9 @@ def _chambers(b: Bench, s: SimpleNamespace) -> None:
     power -= s.pressure * (c.signed_area * s.velocity)
     s.energy += dt * power
     s.mass += dt * np.add.reduce(w.flow, axis=0)
+    if c.purged:
+        s.energy[1] += dt * d.CP_J_KG_K * p.supply_temperature_k * p.purge_kg_s
+        s.mass[1] += dt * p.purge_kg_s
     s.volume = c.volume_0 + c.signed_area * s.position
     if c.walls:
         s.wall += c.wall_gain * (p.wall_loss_w_k * (p.ambient_temperature_k - s.wall) - heat)

@@ -16,7 +16,7 @@ from studies.truth.integrate import open_loop
 from studies.truth.manoeuvre import training_reference
 from studies.truth.replay import REPLAY_SUBSTEPS, STARTS, Replay
 from studies.truth.rule import Misfit
-from studies.truth.run import POSITION_NOISE_M, PRESSURE_NOISE_PA, closed_loop
+from studies.truth.run import POSITION_NOISE_M, PRESSURE_NOISE_PA, Run, closed_loop
 
 
 def scaled(cases: Sequence[Case], rounds: int = rule.ROUNDS) -> list[Case]:
@@ -30,7 +30,12 @@ def misfits(cases: Sequence[Case]) -> list[Misfit]:
         return []
     references = [training_reference(generator(c.hidden, c.seed, "training")) for c in cases]
     noises = [generator(c.hidden, c.seed, "reference run") for c in cases]
-    run = closed_loop([drive_of(c) for c in cases], np.stack(references, axis=1), noises, STARTS)
+    drives = [drive_of(c) for c in cases]
+    return of_run(cases, closed_loop(drives, np.stack(references, axis=1), noises, STARTS))
+
+
+def of_run(cases: Sequence[Case], run: Run) -> list[Misfit]:
+    """Misfits over the windows of a run with one column per case, and its states at `STARTS`."""
     return Replay(drive_of, _starts, _outputs).misfits(cases, run.states, run.readings["command_v"])
 
 

@@ -51,10 +51,10 @@ class Truth:
         """Cases that meet the misfit rule."""
         return rule.scaled(cases, self.misfits, self.draw_size)
 
-    def drawn_cases(self, seeds: Sequence[int]) -> list[Case]:
-        """All cases of these seeds under the misfit rule."""
-        names = (*self.hidden, *self.outside_catalogue, None)
-        return self.scaled([self.draw(hidden, seed) for seed in seeds for hidden in names])
+    @property
+    def names(self) -> tuple[str | None, ...]:
+        """All that a case may hide, and None for nothing."""
+        return (*self.hidden, *self.outside_catalogue, None)
 
 
 def _stored(name: str) -> Path:

@@ -65,7 +65,8 @@ def commanded(
     drives: Sequence[d.Drive],
     commands_v: np.ndarray,
     generators: Sequence[np.random.Generator],
-    start_m: float,
+    start_m: float | np.ndarray,
+    keep_states: Sequence[int] = (),
 ) -> Run:
     """Play commands of shape (n_samples, n_columns) as they are, after 0.3 s with a shut valve."""
     prepared = bench(stack(drives))
@@ -74,14 +75,16 @@ def commanded(
     commands = np.concatenate([shut, commands_v])
     noise = np.stack([g.standard_normal((len(commands), 4)) for g in generators], axis=-1)
     state = d.at_rest(p, np.full(len(drives), start_m), 0.8 * p.supply_pressure_pa)
-    readings, truths = [], []
+    readings, truths, states = [], [], {}
     for k, command in enumerate(commands):
         seen = observed(p, state)
         command_v = quantised(command, COMMAND_STEP_V)
         readings.append({**_read(seen, noise[k]), "command_v": command_v})
         truths.append(seen)
+        if k - SETTLING_SAMPLES in keep_states:
+            states[k - SETTLING_SAMPLES] = state
         state = advance(prepared, state, command_v)
-    return Run(_columns(readings), _columns(truths), {})
+    return Run(_columns(readings), _columns(truths), states)
 
 
 def _columns(rows: list[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:

@@ -1,0 +1,115 @@
+"""How the questions of study ``hidden-effects`` are answered: each ends in one row."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import replace
+from math import nan
+from time import monotonic
+
+from studies.hidden_benches import Bench, bench_of
+from studies.hidden_effects import Answer, Recorded, answer
+from studies.hidden_rows import Kind, Row
+from studies.hidden_tasks import Task
+from workbench.diagnosis.improve import improve
+from workbench.diagnosis.improvement import Improvement
+from workbench.diagnosis.result import Diagnosis, Verdict
+from workbench.rig import Rig
+
+WIDER = 3.0  # 15 % where the catalogue says 5 %
+
+
+def answered(task: Task, recorded: Recorded) -> Row:
+    """The row of a task."""
+    begun = monotonic()
+    case, (train, held_out) = task.cases[0], recorded
+    if task.kind is Kind.PAIR:
+        row = pair_row(task, improve(bench_of(case).user_rig(*task.cases), [train], [held_out]))
+    else:
+        rig = bench_of(case).user_rig(case)
+        rig = widened(rig, WIDER) if task.kind is Kind.WIDTH else rig
+        row = row_of(task, answer(case, train, held_out, rig))
+    return replace(row, seconds=monotonic() - begun)
+
+
+def widened(rig: Rig, factor: float) -> Rig:
+    """The rig with every standard deviation of a prior multiplied."""
+    own = {name: factor * rig.standard_deviation(name) for name in rig.plant.values}
+    return replace(rig, deviations={name: size for name, size in own.items() if size > 0.0})
+
+
+def row_of(task: Task, said: Answer) -> Row:
+    """What a diagnosis said, in plain numbers."""
+    case, ranking, bench = said.case, said.diagnosis.ranking, bench_of(said.case)
+    name = bench.public_name(case)
+    own = next((r for r in ranking if r.candidate.name == name and r.fit is not None), None)
+    weak = said.diagnosis.verdict is Verdict.RECORDING_TOO_WEAK
+    balance = _balance(said.diagnosis)
+    return Row(
+        kind=task.kind,
+        plant=task.plant,
+        hidden=task.hidden,
+        seed=task.seed,
+        size=case.size,
+        first=said.named,
+        found=next((s.value for s in ranking[0].size.values()), nan),
+        verdict=said.diagnosis.verdict.value,
+        place=said.place,
+        tied=said.tied,
+        right=weak if task.kind is Kind.WEAK else said.right,
+        own_drop=own.drop_train if own else nan,
+        balance=balance,
+        balance_right=balance in bench.laws.get(case.hidden or "", ()),
+    )
+
+
+def _balance(diagnosis: Diagnosis) -> str:
+    """The balance of the law that the verdict speaks of, else where the smoother finds a lack."""
+    if diagnosis.law:
+        return diagnosis.law.balance
+    return diagnosis.where.balance if diagnosis.where else ""
+
+
+def pair_row(task: Task, said: Improvement) -> Row:
+    """What was added one after the other, against the two that were hidden."""
+    bench = bench_of(task.cases[0])
+    rounds = zip(said.steps, said.diagnoses, strict=False)
+    tied = {step.candidate.name: found.ranking[0].tied_with for step, found in rounds}
+    hidden = [str(bench.public_name(case)) for case in task.cases]
+    accepted, wrong = counted(said.kept, tied, hidden, bench)
+    return Row(
+        kind=task.kind,
+        plant=task.plant,
+        hidden=task.hidden,
+        seed=task.seed,
+        size=nan,
+        first=" + ".join(said.kept),
+        found=nan,
+        verdict=said.diagnoses[-1].verdict.value,
+        place=0,
+        tied=False,
+        right=accepted == len(hidden) and not wrong,
+        accepted=accepted,
+        wrong=wrong,
+    )
+
+
+def counted(
+    kept: Collection[str], tied: dict[str, tuple[str, ...]], hidden: Collection[str], bench: Bench
+) -> tuple[int, int]:
+    """How many of the hidden effects were accepted, and how many effects that are not there.
+
+    An effect stands for the one hidden effect that it was tied with in its round, if it is no
+    hidden one itself.  The small differences that every truth has are there.
+    """
+    left = [name for name in hidden if name not in kept]
+    wrong = 0
+    for name in kept:
+        alike = [other for other in tied.get(name, ()) if other in left]
+        if name in hidden:
+            continue
+        if alike:
+            left.remove(alike[0])
+        elif name.partition("@")[0] not in bench.always_there:
+            wrong += 1
+    return len(hidden) - len(left), wrong

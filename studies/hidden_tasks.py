@@ -1,0 +1,104 @@
+"""What study ``hidden-effects`` asks: the grid of its cases, and how each is recorded."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from studies.hidden_benches import BENCHES, SERVO_DRIVE, bench_of
+from studies.hidden_effects import Recorded, recordings
+from studies.hidden_rows import Kind
+from studies.study import Extent
+from studies.truth.case import Case
+from studies.truth.cases import NOTHING, read_cases
+from studies.truth.pairs import PAIRS, Pair, record_pairs, stored_pair
+from studies.truth.weak import record_weak, stored_weak
+
+QUICK_SEEDS = (1,)
+WIDTH_SEED = 1  # on the servo drive
+
+
+@dataclass(frozen=True)
+class Task:
+    """One question: what is hidden, two cases for a pair, and how it is asked."""
+
+    kind: Kind
+    cases: tuple[Case, ...]
+
+    @property
+    def plant(self) -> str:
+        """Name of the plant."""
+        return self.cases[0].plant
+
+    @property
+    def hidden(self) -> str:
+        """What is hidden, in one text."""
+        return " + ".join(case.hidden or NOTHING for case in self.cases)
+
+    @property
+    def seed(self) -> int:
+        """The seed of the case, or of both."""
+        return self.cases[0].seed
+
+    @property
+    def key(self) -> str:
+        """A name that changes with the numbers of the cases."""
+        numbers = zlib.crc32(repr(self.cases).encode())
+        return f"{self.kind.value}/{self.plant}/{self.hidden}/{self.seed}/{numbers:08x}"
+
+
+def tasks(extent: Extent) -> list[Task]:
+    """Everything that is stored, or one seed of it; other widths of the priors in full only."""
+    if extent is Extent.FULL:
+        return [*_single(), *_pairs(), *_weak(), *_widths()]
+    return [t for t in (*_single(), *_pairs(), *_weak()) if t.seed in QUICK_SEEDS]
+
+
+def _single() -> Iterator[Task]:
+    for bench in BENCHES.values():
+        for case in read_cases(bench.truth.stored).values():
+            in_catalogue = case.hidden in bench.truth.hidden
+            outside = Kind.LAW if case.hidden else Kind.NOTHING
+            yield Task(Kind.EFFECT if in_catalogue else outside, (case,))
+
+
+def _pairs() -> Iterator[Task]:
+    for names in PAIRS:
+        pair = stored_pair(*names)
+        yield Task(Kind.PAIR, (pair.first, pair.second))
+
+
+def _weak() -> Iterator[Task]:
+    for case in stored_weak():
+        yield Task(Kind.WEAK, (case,))
+
+
+def _widths() -> Iterator[Task]:
+    """One seed of the servo drive's effects once more."""
+    truth = SERVO_DRIVE.truth
+    for case in read_cases(truth.stored).values():
+        if case.seed == WIDTH_SEED and case.hidden in truth.hidden:
+            yield Task(Kind.WIDTH, (case,))
+
+
+def recorded(asked: Sequence[Task]) -> list[Recorded]:
+    """Training and validation recordings of tasks of one plant, in the order of the tasks.
+
+    All that is recorded in one way is made in one batch, and once.
+    """
+    ordinary = list(dict.fromkeys(t.cases[0] for t in asked if t.kind not in _OWN_WAY))
+    made = dict(zip(ordinary, recordings(ordinary), strict=True)) if ordinary else {}
+    found = {t: made[t.cases[0]] for t in asked if t.kind not in _OWN_WAY}
+    for kind, record in _OWN_WAY.items():
+        group = [t for t in asked if t.kind is kind]
+        tables = record(group) if group else []
+        for task, parts in zip(group, tables, strict=True):
+            found[task] = bench_of(task.cases[0]).recorded(f"{task.hidden} {kind.value}", parts)
+    return [found[task] for task in asked]
+
+
+_OWN_WAY = {
+    Kind.PAIR: lambda group: record_pairs([Pair(*task.cases) for task in group]),
+    Kind.WEAK: lambda group: record_weak([task.cases[0] for task in group]),
+}
