@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import casadi as ca
 import numpy as np
 import pytest
 from linear_plant import cart
@@ -19,6 +20,7 @@ from workbench.filtering import (
     smooth,
     smoothed,
 )
+from workbench.plant_filter import transition
 from workbench.plants.servo_drive import COMMAND, OUTPUTS, servo_drive
 from workbench.recording import Recording
 from workbench.simulation import simulate
@@ -281,3 +283,11 @@ def test_an_output_without_noise_is_an_error():
     recording = Recording("bare", 1e-3, {COMMAND: np.zeros(5), OUTPUTS[0]: np.zeros(5)})
     with pytest.raises(ValueError, match=r"no measurement noise for slide\.position_m"):
         recording_filter(servo_drive(), recording)
+
+
+def test_a_slope_that_has_died_away_does_not_spoil_the_transition():
+    A = ca.MX.sym("A", 2, 2)
+    of = ca.Function("F", [A], [transition(A, DT_S)])
+    slopes = np.array([[-1.0, 2.0], [1e-157, -30.0]])
+
+    np.testing.assert_allclose(of(slopes).full(), expm(DT_S * slopes), rtol=0.0, atol=1e-4)

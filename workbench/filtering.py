@@ -126,12 +126,19 @@ class FilterResult:
     log_likelihood: float
 
 
-def filter_pass(found: PlantFilter, recording: Recording) -> FilterResult:
+def filter_pass(
+    found: PlantFilter, recording: Recording, guessed: np.ndarray | None = None
+) -> FilterResult:
     """Extended Kalman filter over a recording.
 
-    NaN samples are skipped; each piece starts from its own first sample.
+    NaN samples are skipped; each piece starts from its own first sample, or from the ``guessed``
+    state there, shape (n_x, n), where there is one for every sample.
     """
-    return _joined(found, [_run(found, piece) for piece in recording.pieces])
+    starts: list[np.ndarray | None] = [None] * len(recording.starts)
+    if guessed is not None:
+        starts = [guessed[:, first] for first in recording.starts]
+    pairs = zip(recording.pieces, starts, strict=True)
+    return _joined(found, [_run(found, piece, start) for piece, start in pairs])
 
 
 def smooth(found: PlantFilter, recording: Recording) -> FilterResult:
@@ -168,6 +175,7 @@ def recording_filter(
     measurement_noise: Mapping[str, float] | None = None,
     process_noise: Mapping[str, float] | None = None,
     decimate: int = 1,
+    initial_deviation: Mapping[str, float] | None = None,
 ) -> PlantFilter:
     """The filter of a plant for the outputs and the clock of a recording.
 
@@ -190,6 +198,7 @@ def recording_filter(
         decimate=decimate,
         measurement_noise={**recording.noise, **(measurement_noise or {})},
         process_noise=process_noise or {},
+        initial_deviation=initial_deviation or {},
         unknown_inputs=unknown_inputs or {},
     )
 
@@ -229,9 +238,11 @@ def _posed(found: PlantFilter, piece: Recording) -> tuple[np.ndarray, tuple[np.n
     return start, (u, d, values, np.where(received, y, 0.0), received)
 
 
-def _run(found: PlantFilter, piece: Recording) -> _Pass:
-    """The filter over one gap-free piece."""
+def _run(found: PlantFilter, piece: Recording, guessed: np.ndarray | None = None) -> _Pass:
+    """The filter over one gap-free piece, from a guessed state, (n_x,), where there is one."""
     start, columns = _posed(found, piece)
+    if guessed is not None:
+        start[: len(guessed)] = guessed / found.plant.scale
     received = columns[-1]
     many = found.sample.mapaccum("filter", received.shape[1], 2)
     results = many(start, found.start_covariance, *columns, found.step_covariance)

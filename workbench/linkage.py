@@ -144,6 +144,17 @@ class JointRod(Part):
         turned = ca.sin(angle_rad + self.datum_rad)
         return self.base_m * self.arm_m * turned / self.length_m(angle_rad)
 
+    def guess(self, seen: Mapping[str, np.ndarray]) -> dict[str, tuple[np.ndarray | float, float]]:
+        """Its motion, for the members whose guess needs it: it has no state of its own."""
+        angle_rad = seen.get(f"{self.joint}.angle_rad")
+        speed_rad_s = seen.get(f"{self.joint}.velocity_rad_s")
+        if angle_rad is None or speed_rad_s is None:
+            return {}
+        position_m, lever_m = (
+            ca.DM(each(angle_rad)).full().ravel() for each in (self.position_m, self.lever_m)
+        )
+        return {"position_m": (position_m, 2e-5), "velocity_m_s": (lever_m * speed_rad_s, 1e-2)}
+
     def derive(self, now: Conditions) -> dict[str, Expression]:
         joint = now[self.joint]
         lever_m = self.lever_m(joint.angle_rad)

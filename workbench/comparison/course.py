@@ -28,14 +28,15 @@ class Course:
     ----------
     whole, plant
         The plant with and without what is absent; absent effects know their geometry too.
-    states
-        Guessed from the recording, shape (n_x, n).
+    states, deviations
+        Guessed from the recording, and their standard deviations, shape (n_x, n).
     """
 
     whole: Plant
     plant: Plant
     recording: Recording
     states: np.ndarray
+    deviations: np.ndarray
 
     def along(self, *expressions: ca.SX) -> np.ndarray:
         """Expressions of the plant's model at every sample, shape (n_expressions, n)."""
@@ -98,7 +99,7 @@ class Place:
 def course_of(plant: Plant, recording: Recording) -> Course:
     """The course of a recording under a plant, with or without what is absent in it."""
     lean = plant.lean()
-    return Course(plant, lean, recording, guessed_states(lean, recording)[0])
+    return Course(plant, lean, recording, *guessed_states(lean, recording))
 
 
 def _place(recording: Recording, name: str) -> Place:

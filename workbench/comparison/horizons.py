@@ -11,12 +11,12 @@ Source: diagnosis.md 1.1.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from workbench.comparison.course import Course
-from workbench.filtering import filter_pass, recording_filter
+from workbench.filtering import FilterResult, filter_pass, recording_filter
 from workbench.fitting.start_states import refit_starts
 from workbench.fitting.window_length import window_length_s
 from workbench.fitting.windows import Windows, cut_windows
@@ -36,17 +36,22 @@ def foretold(course: Course, noise: Mapping[str, float]) -> tuple[dict[str, Rows
     plant, recording = course.plant, course.recording
     if not plant.model.states:
         return {PLAIN: _outputs(plant, simulate(plant, recording))}, []
-    found = {ONE_STEP: _one_step(plant, recording, noise)}
-    notes = lost(recording, found[ONE_STEP])
+    filtered = _filtered(course, noise)
+    found = {ONE_STEP: _one_step(recording, filtered)}
+    notes, paths = lost(recording, found[ONE_STEP]), [filtered.states]
+    free = None
     try:
-        length_s = window_length_s(plant, [recording])
-        found[WINDOW] = _windows(cut_windows(plant, [recording], noise, length_s))
-    except ValueError as error:
-        notes.append(f"no windows: {error}")
-    try:
-        found[FREE_RUN] = _free_run(course)
+        free = _free_run(course)
+        paths.append(np.array([free[name] for name in plant.model.states]))
     except ArithmeticError as error:
         notes.append(f"no free run: {error}")
+    try:
+        length_s = window_length_s(plant, [recording])
+        found[WINDOW] = _windows(cut_windows(plant, [recording], noise, length_s), paths)
+    except ValueError as error:
+        notes.append(f"no windows: {error}")
+    if free:
+        found[FREE_RUN] = {name: free[name] for name in plant.measured}
     return found, notes
 
 
@@ -65,20 +70,40 @@ def _outputs(plant: Plant, recording: Recording) -> Rows:
     return {name: recording[name] for name in plant.measured}
 
 
-def _one_step(plant: Plant, recording: Recording, noise: Mapping[str, float]) -> Rows:
+def _filtered(course: Course, noise: Mapping[str, float]) -> FilterResult:
+    """The filter over the recording.
+
+    It starts where the recording is: from the plant's own initial state a link or a stop
+    would be strained, and a gas mass known no better than its scale becomes any temperature.
+    """
+    plant, recording = course.plant, course.recording
+    known = recording_filter(
+        plant,
+        recording,
+        measurement_noise=noise,
+        process_noise=dict(zip(plant.model.states, PROCESS_SHARE * plant.scale, strict=True)),
+        initial_deviation=dict(zip(plant.model.states, course.deviations[:, 0], strict=True)),
+    )
+    return filter_pass(known, recording, course.states)
+
+
+def _one_step(recording: Recording, found: FilterResult) -> Rows:
     """Measured minus innovation: the outputs foretold one sample before."""
-    process = dict(zip(plant.model.states, PROCESS_SHARE * plant.scale, strict=True))
-    known = recording_filter(plant, recording, measurement_noise=noise, process_noise=process)
-    found = filter_pass(known, recording)
     rows = zip(found.measured, found.innovations, strict=True)
     return {name: recording[name] - innovation for name, innovation in rows}
 
 
-def _windows(windows: Windows) -> Rows:
-    """Outputs of each window from its own start, (n,) with NaN outside of windows."""
-    fit = refit_starts(windows)
-    simulated = windows.measured - fit.residual * windows.scale[:, :, None]
+def _windows(windows: Windows, paths: Sequence[np.ndarray]) -> Rows:
+    """Outputs of each window from its own start, (n,) with NaN outside of windows.
+
+    ``paths`` are states along the recording, (n_x, n) each, where a window may begin to look for
+    its start: then it is no worse than a free run is there.
+    """
     recording, firsts = windows.recordings[0], windows.firsts[0]
+    begun = [path[:, list(firsts)] for path in paths]
+    begun = [np.where(np.isfinite(each), each, windows.start) for each in begun]
+    fit = refit_starts(windows, others=begun)
+    simulated = windows.measured - fit.residual * windows.scale[:, :, None]
     rows = np.full((len(simulated), len(recording)), np.nan)
     for k, first in enumerate(firsts):
         rows[:, first : first + windows.length] = simulated[:, k]
@@ -86,10 +111,11 @@ def _windows(windows: Windows) -> Rows:
 
 
 def _free_run(course: Course) -> Rows:
-    """Outputs from the first sample of each piece to its end."""
+    """States and outputs from the first sample of each piece to its end, (n,) by full name."""
     plant, recording = course.plant, course.recording
     pieces = [
-        _outputs(plant, simulate(plant, piece, course.states[:, first]))
+        simulate(plant, piece, course.states[:, first])
         for first, piece in zip(recording.starts, recording.pieces, strict=True)
     ]
-    return {name: np.concatenate([piece[name] for piece in pieces]) for name in plant.measured}
+    names = dict.fromkeys((*plant.model.states, *plant.measured))
+    return {name: np.concatenate([piece[name] for piece in pieces]) for name in names}

@@ -67,8 +67,7 @@ def regime_shares(fit: Fit) -> dict[str, float]:
         for k, first in enumerate(firsts, start=done):
             squared[first : first + windows.length] = squares[k]
         done += len(firsts)
-        states = guessed_states(plant, recording)[0]
-        course = Course(fit.plant, plant, recording, states)
+        course = Course(fit.plant, plant, recording, *guessed_states(plant, recording))
         for name, samples in regimes_of(course).items():
             sums[name] = sums.get(name, 0.0) + float(np.nansum(squared[samples]))
     total = float(squares.sum())

@@ -10,7 +10,8 @@ Source: diagnosis.md 1.2 and 1.4.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -115,14 +116,21 @@ def _stepped(windows: Windows, unknowns: Unknowns, at: Linearised, now: Cost) ->
     Where none brings much, the windows that got worse under the full step are left out of the
     quadratic model, and its steps are tried again: a window that runs across a break-away has
     slopes that hold nowhere, and would hold all others back.
+
+    Where start states alone move, every window takes the step that suits it best.
     """
     steps = _damped_steps(at, unknowns)
     full, *others = (_after(windows, unknowns, now.point, step) for step in steps)
     first = points_costs(windows, unknowns, [full]).best
+    if not len(unknowns):
+        first = best_of_each((now, first))
     promised = now.cost - _promised(at, unknowns, steps[0])
     if now.cost - first.cost > HALF * promised > 0:
         return first
-    best = min((first, points_costs(windows, unknowns, others).best), key=lambda each: each.cost)
+    damped = points_costs(windows, unknowns, others)
+    if not len(unknowns):
+        return best_of_each((first, *damped.rows))
+    best = min((first, damped.best), key=lambda each: each.cost)
     if now.cost - best.cost > AGAIN * now.cost:
         return best
     worse = first.by_window > now.by_window
@@ -197,6 +205,23 @@ class Costs:
     def best(self) -> Cost:
         """The cheapest."""
         return min(self.rows, key=lambda each: each.cost)
+
+
+def best_of_each(costs: Sequence[Cost]) -> Cost:
+    """The start states of each window from where they cost least.
+
+    ``costs`` belong to points that differ in their start states alone: windows share no others.
+    """
+    chosen = np.argmin([each.by_window for each in costs], axis=0)
+    starts, residual = costs[0].point.starts.copy(), costs[0].residual.copy()
+    by_window = costs[0].by_window.copy()
+    for k, each in enumerate(costs):
+        own = chosen == k
+        starts[:, own], residual[:, own] = each.point.starts[:, own], each.residual[:, own]
+        by_window[own] = each.by_window[own]
+    chi2, prior = float(np.sum(residual**2)), costs[0].cost - float(costs[0].by_window.sum())
+    point = replace(costs[0].point, starts=starts)
+    return Cost(point, chi2, float(by_window.sum()) + prior, by_window, residual)
 
 
 def points_costs(windows: Windows, unknowns: Unknowns, points: list[Point]) -> Costs:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from workbench.fitting.gauss_newton import Fit, fit_windows, points_costs
+from workbench.fitting.gauss_newton import Fit, best_of_each, fit_windows, points_costs
 from workbench.fitting.linearised import Point, seen_at
 from workbench.fitting.unknowns import Unknowns
 from workbench.fitting.windows import Windows
@@ -17,21 +17,26 @@ def refit_starts(
     values: Mapping[str, float] | None = None,
     near: Fit | None = None,
     iterations: int = 8,
+    others: Sequence[np.ndarray] = (),
 ) -> Fit:
     """Only the start states move: how well a plant with given values predicts a recording.
 
     ``near`` is a fit of a plant with fewer effects, or other values, on the same windows: where
-    to begin, and where the states are the same with its derivatives.
+    to begin, and where the states are the same with its derivatives.  ``others`` are start states,
+    (n_x, n_windows) each, for the windows which they suit better than the guess: from far away a
+    window may not find its way.
     """
     nothing = Unknowns((), *(np.zeros(0) for _ in range(5)), held=values or {})
-    if near is None:
-        return fit_windows(windows, nothing, iterations=iterations)
-    point = Point(np.zeros(0), carried(near.point.starts, near.windows, windows))
-    start, at = points_costs(windows, nothing, [point]).best, None
-    states, theirs = (list(each.plant.state_list) for each in (windows, near.windows))
-    if near.windows.scale is windows.scale and theirs == states:
-        at = seen_at(windows, near.derivatives, point, start.residual)
+    guess = windows.start if near is None else carried(near.point.starts, near.windows, windows)
+    points = [Point(np.zeros(0), starts) for starts in (guess, *others)]
+    start, at = best_of_each(points_costs(windows, nothing, points).rows), None
+    if near is not None and near.windows.scale is windows.scale and _same_states(near, windows):
+        at = seen_at(windows, near.derivatives, start.point, start.residual)
     return fit_windows(windows, nothing, start, iterations, at)
+
+
+def _same_states(near: Fit, windows: Windows) -> bool:
+    return list(near.windows.plant.state_list) == list(windows.plant.state_list)
 
 
 def carried(starts: np.ndarray, near: Windows, windows: Windows) -> np.ndarray:

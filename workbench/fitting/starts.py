@@ -55,13 +55,15 @@ def sensed_states(plant: Plant, recording: Recording, blind: np.ndarray) -> np.n
     n, starts = len(recording), recording.starts
     seen = {name: bridged(values, starts) for name, values in recording.channels.items()}
     for name in list(seen):
-        speed = name.replace("position_m", "velocity_m_s").replace("angle_rad", "rate_rad_s")
+        speed = name.replace("position_m", "velocity_m_s").replace("angle_rad", "velocity_rad_s")
         if speed != name and speed not in seen:
             seen[speed] = slope(seen[name], recording.sample_time_s, starts)
     seen["time_s"] = recording.time_s
     rows = []
     for member in plant.members:
         guesses = member.guess(seen)
+        for quantity, (value, _) in guesses.items():
+            seen.setdefault(f"{member.name}.{quantity}", np.broadcast_to(value, (n,)))
         for state in member.states():
             value, deviation = guesses.get(state.quantity, (float(state.initial), state.scale))
             values = np.broadcast_to(np.asarray(value, dtype=float), (n,))
