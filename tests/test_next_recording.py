@@ -16,11 +16,16 @@ from studies.text_of_results import next_recording_text
 from studies.truth.cases import read_cases
 from workbench.comparison.run import read_inputs
 from workbench.diagnosis.diagnose import diagnose
+from workbench.diagnosis.manoeuvre_choice import least_gain
 from workbench.diagnosis.next_recording import next_recording
+from workbench.diagnosis.result import DecidedBy, Ranked
 from workbench.diagnosis.rivals import distance
+from workbench.diagnosis.showing import showing
+from workbench.effect import Kind
 from workbench.fitting.gauss_newton import fit_windows
 from workbench.fitting.linearised import Linearised, Point
 from workbench.fitting.noise import measured_noise
+from workbench.fitting.problem import Problem
 from workbench.fitting.unknowns import nominal_unknowns
 from workbench.fitting.windows import cut_windows
 from workbench.manoeuvres.library import LIBRARY, position_triangle
@@ -227,6 +232,31 @@ def test_nothing_is_recommended_for_rivals_that_are_the_same(rivals):
     assert next_recording({"one": fit, "same": fit}, SHORT[:1]) is None
     with pytest.raises(ValueError, match="at least two"):
         next_recording({"one": fit})
+
+
+def test_enough_gain_passes_the_judge_in_eight_of_ten():
+    z = np.random.default_rng(2).standard_normal(100_000)
+    for more, samples in ((0, 1.0), (1, 300.0), (2, 300.0)):
+        least = least_gain(more, samples)
+        passes = least + 2.0 * np.sqrt(least) * z > 4.0 + more * np.log(samples)
+        assert np.mean(passes) == pytest.approx(0.8, abs=0.01)
+
+
+def test_an_effect_that_was_not_shown_gets_the_manoeuvre_that_shows_it(demo_rig, rivals):
+    base = rivals["constant_force"]
+    name = "sensor_offset@chamber_a.pressure"
+    whole = demo_rig.fit_for(base.windows.recordings[0])
+    problem = Problem(demo_rig, whole, (), base, None)
+    row = Ranked(whole.candidates[name], Kind.EFFECT, {}, 0.0, 0.0, (), 0.0, DecidedBy.SCAN,
+                 False, (), visible_from=5.0)  # fmt: skip
+
+    asked = showing(problem, [row], SHORT)
+
+    assert asked.separates == ("nothing", name)
+    assert asked.what.startswith(tuple(each.words for each in SHORT))
+    assert asked.expected_gain >= least_gain(1)
+    assert asked.alike == ()
+    assert showing(problem, [replace(row, visible_from=0.5)], SHORT) is None
 
 
 @pytest.mark.filterwarnings("ignore:.*did you mean 'reference")

@@ -82,8 +82,8 @@ def dead_zone_figure(found: DeadZoneLimits) -> Figure:
             command, measured, fitted = thinned(curve.along, curve.measured, curve.fitted)
             labels = ({"label": "measured"}, {"label": "fitted"}) if not k else ({}, {})
             axes.plot(command, measured / PA_PER_BAR, "-", color=GREY, linewidth=2.5, **labels[0])
-            axes.plot(command, fitted / PA_PER_BAR, "-", color=BLUE, **labels[1])
-        for limit_v, name, style in ((found.lower_v, "zms", "--"), (found.upper_v, "zmd", "-.")):
+            axes.plot(command, fitted / PA_PER_BAR, "--", color=BLUE, **labels[1])
+        for limit_v, name, style in ((found.lower_v, "zms", ":"), (found.upper_v, "zmd", "-.")):
             axes.axvline(limit_v, color=RED, linestyle=style, label=f"{name} {limit_v:.3f} V")
         axes.set_xlabel("command (V)")
         axes.set_ylabel("reservoir pressure (bar)")
@@ -102,7 +102,7 @@ def wall_heat_figure(found: WallHeatFit) -> Figure:
         tau = found["time_constant_s"].value
         for curve, name, colour, style in (
             (exponential, f"exponential, tau {tau:.3f} s", ORANGE, "--"),
-            (law, "heat law", BLUE, "-"),
+            (law, "heat law", BLUE, ":"),
         ):
             (fitted,) = thinned(curve.fitted)
             upper.plot(time_s, fitted / PA_PER_BAR, linestyle=style, color=colour, label=name)

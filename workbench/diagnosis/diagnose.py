@@ -136,7 +136,7 @@ def diagnose(
             warnings=warnings,
             base=problem.base,
             base_validation=problem.base_validation,
-            next_recording=recommended(verdict, ranking, problem.base, progress),
+            next_recording=recommended(problem, verdict, ranking, progress),
         ),
         doubts,
     )

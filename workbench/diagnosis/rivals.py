@@ -15,8 +15,9 @@ models".
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
@@ -43,34 +44,38 @@ class Rehearsed:
 
 
 def distances(
-    fits: Sequence[Fit], rehearsed: Sequence[Rehearsed], most: int | None = None
+    fits: Sequence[Fit],
+    rehearsed: Sequence[Rehearsed],
+    most: int | None = None,
+    pairs: Iterable[tuple[int, int]] | None = None,
 ) -> np.ndarray:
-    """T of each manoeuvre for each pair of rivals, in the order of combinations of two.
-
-    Shape (n_manoeuvres, n_pairs).
+    """T of each manoeuvre for each pair of rivals, shape (n_manoeuvres, n_pairs).
 
     ``fits`` are the rivals, the likeliest first; the typical errors of that one weigh residuals.
-    ``most`` bounds the windows of each manoeuvre; T counts as of all.
+    ``most`` bounds the windows of each manoeuvre; T counts as of all.  Of each of the ``pairs`` the
+    first is to explain what the second would record; by default all combinations of two, in order.
     """
     errors = fits[0].windows.rescaled(fits[0].residual)
     columns: list[list[float]] = []
     near: Near | None = None
-    for k, fit in enumerate(fits[:-1]):
-        precision = np.linalg.inv(posterior_covariance(fit))
-        for j in range(k + 1, len(fits)):
-            pairs = [(each.recorded[j], each.recorded[k]) for each in rehearsed]
-            windows, of_all = _windows(fit, pairs, most)
-            windows = windows.scaled_like(errors)
-            at = _derivatives(windows, fit, near)
-            near = near or (at, (windows, fit.unknowns))
-            owner = np.repeat(np.arange(len(rehearsed)), [len(own) for own in windows.firsts])
-            most_chi2 = OUTLYING**2 * np.sum(windows.length / windows.correlation, axis=0)
-            columns.append(
-                [
-                    distance(at.part(owner == m), precision, most_chi2[owner == m], of_all)
-                    for m in range(len(rehearsed))
-                ]
-            )
+    precisions: dict[int, np.ndarray] = {}
+    for k, j in pairs or combinations(range(len(fits)), 2):
+        fit = fits[k]
+        if k not in precisions:
+            precisions[k] = np.linalg.inv(posterior_covariance(fit))
+        both = [(each.recorded[j], each.recorded[k]) for each in rehearsed]
+        windows, of_all = _windows(fit, both, most)
+        windows = windows.scaled_like(errors)
+        at = _derivatives(windows, fit, near)
+        near = near or (at, (windows, fit.unknowns))
+        owner = np.repeat(np.arange(len(rehearsed)), [len(own) for own in windows.firsts])
+        most_chi2 = OUTLYING**2 * np.sum(windows.length / windows.correlation, axis=0)
+        columns.append(
+            [
+                distance(at.part(owner == m), precisions[k], most_chi2[owner == m], of_all)
+                for m in range(len(rehearsed))
+            ]
+        )
     return np.array(columns).T
 
 
