@@ -13,7 +13,7 @@ from studies.study import Extent
 from studies.truth.case import Case
 from studies.truth.cases import NOTHING, read_cases
 from studies.truth.pairs import PAIRS, Pair, record_pairs, stored_pair
-from studies.truth.weak import record_weak, stored_weak
+from studies.truth.weak import WEAK, record_weak, stored_weak
 
 QUICK_SEEDS = (1,)
 WIDTH_SEED = 1  # on the servo drive
@@ -43,8 +43,9 @@ class Task:
 
     @property
     def key(self) -> str:
-        """A name that changes with the numbers of the cases."""
-        numbers = zlib.crc32(repr(self.cases).encode())
+        """A name that changes with the numbers of the cases, and with a manoeuvre of its own."""
+        played = WEAK[self.hidden] if self.kind is Kind.WEAK else ()
+        numbers = zlib.crc32(repr((self.cases, played)).encode())
         return f"{self.kind.value}/{self.plant}/{self.hidden}/{self.seed}/{numbers:08x}"
 
 

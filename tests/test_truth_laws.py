@@ -114,4 +114,4 @@ def test_in_weak_recordings_the_hidden_effect_is_below_the_noise():
     for found in weak.misfits(cases):
         assert max(each.hidden for each in found) < 0.1 * rule.VISIBLE
     for train, held_out in weak.record_weak(cases):
-        assert max(np.ptp(table["position_mm"]) for table in (train, held_out)) < 10.0
+        assert max(np.ptp(table["position_mm"]) for table in (train, held_out)) < 1.0

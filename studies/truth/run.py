@@ -35,6 +35,7 @@ def closed_loop(
     references_m: np.ndarray,
     generators: Sequence[np.random.Generator],
     keep_states: Sequence[int] = (),
+    start_m: float | np.ndarray = START_M,
 ) -> Run:
     """Follow references of shape (n_samples, n_columns), after 0.3 s of unrecorded settling."""
     prepared = bench(stack(drives))
@@ -45,7 +46,7 @@ def closed_loop(
     # The person has tuned the jump a little short of the true half-width: no limit cycle.
     p = prepared.drive
     loop = Loop(p.dead_zone_centre_v, 0.95 * p.dead_zone_half_width_v)
-    state = d.at_rest(p, np.full(len(drives), START_M), 0.8 * p.supply_pressure_pa)
+    state = d.at_rest(p, np.full(len(drives), start_m), 0.8 * p.supply_pressure_pa)
     memory = start_loop(state.position_m)
     readings, truths, states = [], [], {}
     for k in range(len(reference)):

@@ -18,7 +18,6 @@ from studies.truth.draw import drive_of
 from studies.truth.drive import Drive
 from studies.truth.manoeuvre import SAMPLES
 from studies.truth.misfit import of_run
-from studies.truth.movement import time_s
 from studies.truth.record import Table, table
 from studies.truth.replay import STARTS
 from studies.truth.rule import Misfit
@@ -31,10 +30,9 @@ PURPOSES = ("training", "validation")
 
 @dataclass(frozen=True)
 class Rest:
-    """What a position loop follows: a place, left at a creep."""
+    """A position loop holds the slide where it is."""
 
     place_m: float
-    creep_m_s: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -53,7 +51,7 @@ WEAK: dict[str, tuple[Manoeuvre, Manoeuvre]] = {
     "valve_lag": (Rest(0.145), Rest(0.08)),
     "discharge_asymmetry": (InsideDeadZone(0.10, 0.5), InsideDeadZone(0.19, 0.5)),
     "supply_restriction": (InsideDeadZone(0.06, 0.7), InsideDeadZone(0.145, 0.3)),
-    "viscous_friction": (Rest(0.06, 5e-4), Rest(0.145, 5e-4)),
+    "viscous_friction": (InsideDeadZone(0.19, 0.4), Rest(0.10)),
     "wall_heat": (Rest(0.20), InsideDeadZone(0.12, 0.3)),
 }
 
@@ -88,7 +86,7 @@ Keys = list[tuple[int, int]]  # case, and training (0) or validation (1), of eac
 def _runs(cases: Sequence[Case]) -> Iterator[tuple[Keys, Run]]:
     """One batch in position loops, and one whose commands are played as they are."""
     wanted = {(i, k): WEAK[str(case.hidden)][k] for i, case in enumerate(cases) for k in (0, 1)}
-    for kind, run in ((Rest, _followed), (InsideDeadZone, _played)):
+    for kind, run in ((Rest, _held), (InsideDeadZone, _played)):
         keys = [key for key, manoeuvre in wanted.items() if isinstance(manoeuvre, kind)]
         if keys:
             drives = [drive_of(cases[i]) for i, _ in keys]
@@ -98,11 +96,12 @@ def _runs(cases: Sequence[Case]) -> Iterator[tuple[Keys, Run]]:
             yield keys, run(drives, [wanted[key] for key in keys], generators)
 
 
-def _followed(
+def _held(
     drives: Sequence[Drive], asked: Sequence[Rest], generators: Sequence[np.random.Generator]
 ) -> Run:
-    references = [each.place_m + each.creep_m_s * time_s(SAMPLES) for each in asked]
-    return closed_loop(drives, np.stack(references, axis=1), generators, STARTS)
+    places_m = np.array([each.place_m for each in asked])
+    references = np.repeat(places_m[None], SAMPLES, axis=0)
+    return closed_loop(drives, references, generators, STARTS, places_m)
 
 
 def _played(
