@@ -32,7 +32,7 @@ from workbench.reading import read_recording
 from workbench.rig import load_rig
 
 HIDDEN = "piston_leak"
-COMPARED = (HIDDEN, "coulomb_friction", "valve_offset")
+COMPARED = (HIDDEN, "spool_leak", "exhaust_restriction")
 MOST_MB = 1000.0
 LEAST_RATIO = 30.0
 BEGUN_AT = 0.3  # of the typical size: where scipy begins
