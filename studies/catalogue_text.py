@@ -10,7 +10,7 @@ from typing import Any
 from studies.text import columns, shown
 from workbench.causes import all_causes, why_not
 from workbench.errors import InputError, Message, listed, nearest
-from workbench.plant import Plant
+from workbench.plant import TOGETHER, Plant
 from workbench.plant_files import plant_named
 from workbench.plants import PLANTS
 from workbench.rig import parameter_names
@@ -71,11 +71,15 @@ def effects_of_plant_text(name: str) -> str:
 def candidate_name(plant: Plant, effect: str, at: str | None) -> str:
     """The full name of an effect or empirical term at its place: ``chamber_leak@chamber_a``.
 
+    Two effects with a plus between them, ``a + b@place``, are a pair.
+
     Raises
     ------
     InputError
         If the plant has no such effect, or several and no place is named.
     """
+    if TOGETHER in effect and not at:
+        return TOGETHER.join(candidate_name(plant, each, None) for each in effect.split(TOGETHER))
     name = f"{effect}@{at}" if at else effect
     there = [*plant.candidates, *law_terms(plant)]
     if name in there:

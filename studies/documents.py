@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from workbench.diagnosis.result import Diagnosis, Law, NextRecording, Ranked, Where
     from workbench.fitting.errors import SignalError
     from workbench.identification.result import Estimate, Identified
+    from workbench.plant import Candidate
 
 Document = dict[str, Any]
 
@@ -78,6 +79,7 @@ def diagnosis_document(found: Diagnosis, unit_of: Mapping[str, str]) -> Document
         "verdict": found.verdict.value,
         "effect": named.candidate.cause.name if named else None,
         "at": named.candidate.place if named else None,
+        "together_with": _partner(named.candidate) if named else None,
         "sentence": found.sentence,
         "ranking": [_ranked(row) for row in found.ranking],
         "where": _where(found.where) if found.where else None,
@@ -136,13 +138,21 @@ def plain(value: float) -> float | None:
     return float(value) if isfinite(value) else None
 
 
+def _partner(candidate: Candidate) -> Document | None:
+    """The second effect of a pair."""
+    return next(({"effect": c.cause.name, "at": c.place} for c in candidate.singles[1:]), None)
+
+
 def _ranked(row: Ranked) -> Document:
+    """A row of the ranking; the sizes of a pair go by full names, two may have an ``area``."""
+    pair = len(row.candidate.singles) > 1
     return {
         "effect": row.candidate.cause.name,
         "at": row.candidate.place,
+        "together_with": _partner(row.candidate),
         "kind": row.kind.value,
         "size": {
-            public_name(name).rpartition(".")[2]: {
+            public_name(name)[0 if pair else public_name(name).rfind(".") + 1 :]: {
                 "value": plain(size.value),
                 "unit": si_unit(name),
                 "std": plain(size.deviation),

@@ -16,6 +16,8 @@ import numpy as np
 from workbench.effect import Cause, Conditions, Effect, Expression, Parameter, Part, State, Term
 from workbench.model import Model, flow_paths
 
+TOGETHER = " + "  # between the names of two effects that are put in together
+
 
 @dataclass(frozen=True)
 class Signal:
@@ -60,6 +62,39 @@ class Candidate:
     def held(self) -> str | None:
         """Full name of the fitted parameter that this cause shifts, if it shifts one."""
         return f"{self.member}.{self.cause.held}" if self.cause.held else None
+
+    @property
+    def singles(self) -> tuple[Candidate, ...]:
+        """The causes that it puts into a plant: itself, or both of a pair."""
+        return (self,)
+
+
+@dataclass(frozen=True)
+class CandidatePair(Candidate):
+    """Two causes that are put into a plant together; all of the second goes with the first."""
+
+    second: Candidate
+
+    @property
+    def first(self) -> Candidate:
+        return Candidate(self.cause, self.member, self.place)
+
+    @property
+    def name(self) -> str:
+        return f"{self.first.name}{TOGETHER}{self.second.name}"
+
+    @property
+    def forms(self) -> tuple[str, ...]:
+        return (*self.first.forms, self.second.strength, *self.second.forms)
+
+    @property
+    def singles(self) -> tuple[Candidate, ...]:
+        return (self.first, self.second)
+
+
+def together(first: Candidate, second: Candidate) -> CandidatePair:
+    """Two causes as one candidate."""
+    return CandidatePair(first.cause, first.member, first.place, second)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -87,7 +87,8 @@ def add(
 
     EFFECT may be an empirical term of a diagnosis, such as "law[v|v|]@slide", or law: then the
     empirical law of up to three terms that explains most.  It is no physical effect, and the rig
-    file says in which range it was seen.
+    file says in which range it was seen.  Two effects that only work together are added as one,
+    "constant_force + spring_force", each with its place behind an @.
     """
     with answering(quiet) as say:
         from studies.catalogue_text import candidate_name

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from workbench.consistency import checked
 from workbench.diagnosis.diagnose import WEAK_EVIDENCE, Progress, silent
 from workbench.diagnosis.law import empirical_law, plant_with_terms
+from workbench.diagnosis.pairs import pair_fit
 from workbench.diagnosis.refit import refit
 from workbench.diagnosis.result import Diagnosis, Law
 from workbench.diagnosis.rough import rough_fit
@@ -18,7 +19,7 @@ from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.posterior import fitted_rig, posterior_deviation
 from workbench.fitting.problem import NO_EVIDENCE, Problem, pose, proves_nothing, split
 from workbench.law_range import ranges_text
-from workbench.plant import Candidate, require
+from workbench.plant import TOGETHER, Candidate, Plant, require
 from workbench.recording import Recording
 from workbench.rig import Rig
 from workbench.rig_laws import is_law
@@ -62,7 +63,7 @@ def add(
     validation: Sequence[Recording] = (),
     progress: Progress = silent,
 ) -> Addition:
-    """Add one effect of the catalogue, or one empirical term, to a rig and refit.
+    """Add one effect of the catalogue, two (``a + b``), or one empirical term to a rig and refit.
 
     Raises
     ------
@@ -70,29 +71,46 @@ def add(
         If the plant has no such effect for these recordings, with the nearest name.
     ValueError
         If the effect is there already, only a shift of a parameter that is fitted anyway, fixed by
-        the rig, or a change of something that the plant lacks.
+        the rig, or a change of something that the plant lacks; or if there are more than two.
     """
     train, validation = _with_held_out(rig, train, validation)
     if is_law(name):
         rig = replace(rig, plant=plant_with_terms(rig.plant, train, [name]))
     plant = rig.fit_for(train[0])
-    require([name], plant.candidates, plant.name)
-    candidate = plant.candidates[name]
+    names = _names_in(name)
+    require(names, plant.candidates, plant.name)
+    candidates = [plant.candidates[each] for each in names]
     progress("prior fit")
     problem = pose(rig, train, validation)
+    for candidate in candidates:
+        _require_absent(rig, plant, problem, candidate)
+    progress(f"refit with {name}")
+    base = problem.base
+    profiles = scan(problem.whole, base.windows, base.unknowns, base.point, candidates)
+    begun = rough_fit(problem, profiles[0]) if len(names) == 1 else pair_fit(problem, profiles)
+    found = refit(problem, begun)
+    before = errors_of(base, problem.base_validation)
+    drops = (found.drop_train, found.drop_validation)
+    return addition(rig, before, found.candidate, found.fit, found.validation, drops)
+
+
+def _names_in(name: str) -> list[str]:
+    """The names of one effect, or of the two of a pair."""
+    names = name.split(TOGETHER)
+    if len(names) > 2 or len(set(names)) < len(names):
+        raise ValueError(f"{name}: {len(names)} effects; expected one, or two different ones")
+    return names
+
+
+def _require_absent(rig: Rig, plant: Plant, problem: Problem, candidate: Candidate) -> None:
+    """Raise ValueError where a candidate is there already or has nothing to be fitted."""
+    name = candidate.name
     if candidate in problem.added or _present(problem, candidate):
         raise ValueError(f"{name}: {rig.name} has it already; fit moves it")
     if not plant.ready_for(candidate):
         raise ValueError(f"{name}: nothing without {candidate.member}.{candidate.cause.needs}")
     if candidate.strength in rig.fixed:
         raise ValueError(f"{name}: {rig.name} fixes {candidate.strength}: nothing to fit")
-    progress(f"refit with {name}")
-    base = problem.base
-    profiles = scan(problem.whole, base.windows, base.unknowns, base.point, [candidate])
-    found = refit(problem, rough_fit(problem, profiles[0]))
-    before = errors_of(base, problem.base_validation)
-    drops = (found.drop_train, found.drop_validation)
-    return addition(rig, before, candidate, found.fit, found.validation, drops)
 
 
 def add_law(
@@ -144,6 +162,20 @@ def accept(rig: Rig, diagnosis: Diagnosis) -> Addition:
         raise ValueError(f"{diagnosis.rig_name}: the diagnosis followed no candidate to a refit")
     drops = (best.drop_train, best.drop_validation)
     return addition(rig, diagnosis.before, best.candidate, best.fit, best.validation, drops)
+
+
+def apart(step: Addition) -> tuple[Addition, ...]:
+    """An addition of a pair as two that share their fit, each with a note of its own."""
+    pair = step.candidate.singles
+    if len(pair) < 2:
+        return (step,)
+    *before, last = step.rig.notes
+    said = last.removeprefix(step.candidate.name)
+    halves = []
+    for one, other in ((pair[0], pair[1]), (pair[1], pair[0])):
+        before.append(f"{one.name}, together with {other.name}{said}")
+        halves.append(replace(step, candidate=one, rig=replace(step.rig, notes=tuple(before))))
+    return tuple(halves)
 
 
 def accept_law(rig: Rig, law: Law, before: Errors) -> tuple[Addition, ...]:
@@ -224,7 +256,8 @@ def addition(
 ) -> Addition:
     """A fit with one more effect as an addition to the rig that it was fitted for."""
     share, unseen = drops
-    found = fitted_rig(rig, fit, [candidate.name] if is_new(rig, candidate) else [])
+    new = [each.name for each in candidate.singles if is_new(rig, each)]
+    found = fitted_rig(rig, fit, new)
     kind = ""
     if is_law(candidate.name):
         kind = f"empirical, not a physical effect, seen for {ranges_text(found.seen)}; "

@@ -1,8 +1,8 @@
 """One round of diagnosis: which physical effect is missing.
 
 Prior fit, projected profile scan over the catalogue, first fits of the few that it puts in front,
-refits of the best few, judgement on a held-out recording, ties, and the verdict in words.  Nothing
-is changed and nothing is written.
+refits of the best few, pairs where single effects fail, judgement on a held-out recording, ties,
+and the verdict in words.  Nothing is changed and nothing is written.
 
 Source: diagnosis.md 1.2 to 1.9.
 """
@@ -16,6 +16,7 @@ from workbench.comparison.regimes import regime_shares
 from workbench.consistency import trusted
 from workbench.diagnosis.credible import credible
 from workbench.diagnosis.judge import (
+    CERTAIN_SHARE,
     CLEARLY_LESS,
     LEAST_TRAINING,
     SHARE_REASON,
@@ -25,6 +26,7 @@ from workbench.diagnosis.judge import (
 )
 from workbench.diagnosis.law import empirical_law
 from workbench.diagnosis.next_recording import recommended
+from workbench.diagnosis.pairs import with_pairs
 from workbench.diagnosis.ranking import ranked
 from workbench.diagnosis.refit import Refit, refit, refit_shift
 from workbench.diagnosis.result import NAMING, Diagnosis, Law, Ranked, Where
@@ -54,7 +56,6 @@ WORTH_A_REFIT = 0.4  # of the best share of the first fits
 SHIFTS_REFITTED = 2  # parameters that leave their priors
 WORTH_A_SHIFT = 0.25  # of the best refit
 LOCATED = 2  # candidates that are followed because they act where the smoother finds a lack
-CERTAIN_SHARE = 0.5  # an accepted candidate above it needs no comparison with an empirical law
 
 WEAK_EVIDENCE = "no validation recording: the last third is held out, which is weak evidence"
 
@@ -115,6 +116,7 @@ def diagnose(
         found = _followed(problem, where, progress)
     profiles, refits, moved = found.profiles, found.refits, found.moved
     ranking = ranked(problem, profiles, refits, moved, found.begun)
+    ranking = with_pairs(problem, ranking, profiles, progress)
     law = _law(problem, ranking, profiles, progress)
     far = far_above_noise(problem.base_validation)
     verdict = judged(ranking, law, held_out, far)

@@ -23,6 +23,7 @@ from workbench.diagnosis.addition import (
     accept_law,
     add,
     add_law,
+    apart,
     assembled,
     moved_parameters,
 )
@@ -121,7 +122,7 @@ def _forward(
             break
         progress(f"accepted {best.candidate.name}")
         step = accept(current, diagnosis)
-        steps = (*done.steps, step)
+        steps = (*done.steps, *apart(step))
         kept = Kept(steps, step.fit, step.validation_fit)
         done = replace(done, steps=steps, kept=kept)
         label = f"+ {step.candidate.name}"
@@ -136,7 +137,8 @@ def _thought_over(
     progress: Progress,
 ) -> _Rounds:
     """Backward pass, then swap pass; an interrupt keeps what is finished."""
-    accepted = {s.candidate.name: d for s, d in zip(done.steps, done.diagnoses, strict=False)}
+    rounds = [each for each in done.diagnoses if each.ranking and each.ranking[0].accepted]
+    accepted = {c.name: each for each in rounds for c in each.ranking[0].candidate.singles}
     passes = Passes(done.rig, train, validation, accepted, progress)
     try:
         for step in done.steps:

@@ -12,6 +12,8 @@ the criterion.  A candidate is accepted when
    recordings and with no less than 10 % in training: less may stand for something else,
 4. its size is inside its bounds, more than 3 % of typical, and more than two standard deviations
    from none.
+
+A pair pays for the parameters of both, takes twice the share, and both sizes must be sound.
 """
 
 from __future__ import annotations
@@ -21,9 +23,11 @@ from math import isclose, isnan, log, sqrt
 import numpy as np
 
 from workbench.diagnosis.refit import Refit
+from workbench.diagnosis.result import Ranked
 from workbench.diagnosis.scan import Profile
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.window_length import moves
+from workbench.plant import Candidate
 
 LEAST_BIC = 4.0
 LEAST_HELD_OUT = 0.02
@@ -37,6 +41,7 @@ AT_BOUND = 1e-9  # relative: a value scaled and back is off by a rounding
 LARGEST_TIE = 3
 SAME_DIRECTION = 0.9  # cosine of two signatures that are one
 CLOSE_DROP = 0.25  # of the leader's drop: within it the order is not to be trusted
+CERTAIN_SHARE = 0.5  # an accepted candidate above it needs no comparison with a pair or a law
 CLEARLY_LESS = 0.20  # of the held-out misfit that is left
 CLOSE_DROP_SAME = 0.50  # the same for signatures that are one
 
@@ -55,8 +60,9 @@ def reasons_against(base: Fit, refit: Refit, parameters: int = 0) -> tuple[str, 
         against.append("gains less than its parameters cost")
     if not predicts(refit):
         against.append(HELD_OUT_REASON)
-    if _share(refit) < LEAST_SHARE or refit.drop_train < LEAST_TRAINING:
-        against.append(SHARE_REASON)
+    each = len(refit.candidate.singles)
+    if _share(refit) < each * LEAST_SHARE or refit.drop_train < each * LEAST_TRAINING:
+        against.append(SHARE_REASON if each == 1 else f"{SHARE_REASON} each")
     return (*against, *_size_reasons(refit))
 
 
@@ -108,7 +114,10 @@ def effective_samples(fit: Fit) -> float:
 
 def _size_reasons(refit: Refit) -> list[str]:
     """Size criteria: not negligible, not at a bound."""
-    candidate = refit.candidate
+    return [why for each in refit.candidate.singles for why in _reasons_of_size(refit, each)]
+
+
+def _reasons_of_size(refit: Refit, candidate: Candidate) -> list[str]:
     name = candidate.strength if candidate.strength in refit.size else candidate.held
     if name not in refit.size:
         return []
@@ -148,13 +157,13 @@ def tie_group(base: Fit, refits: list[Refit], profiles: dict[str, Profile]) -> l
     sound = [each for each in tied if not reasons_against(base, each)] or tied[:LARGEST_TIE]
     tied = tied[: max(len(sound), LARGEST_TIE)]
     effects = [each for each in sound if each.candidate.name in profiles] or sound
-    best, leader = effects[0], min(effects, key=_left_held_out)
-    if not _left_held_out(leader) < (1.0 - CLEARLY_LESS) * _left_held_out(best):
+    best, leader = effects[0], min(effects, key=left_held_out)
+    if not left_held_out(leader) < (1.0 - CLEARLY_LESS) * left_held_out(best):
         leader = best
     return [leader, *(each for each in tied if each is not leader)]
 
 
-def _left_held_out(each: Refit) -> float:
+def left_held_out(each: Refit | Ranked) -> float:
     """Share of the held-out misfit that is left, at least one percent."""
     return 1.0 if isnan(each.drop_validation) else max(1.0 - each.drop_validation, 0.01)
 

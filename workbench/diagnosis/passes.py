@@ -84,8 +84,12 @@ class Kept:
         return tuple(step.candidate.name for step in self.steps)
 
     def judged(self, step: Addition) -> bool:
-        """True for what was accepted last: the model of its round is the final one without it."""
-        return step is self.steps[-1] and step.fit is self.fit
+        """True for what was accepted last: the model of its round is the final one without it.
+
+        Of a pair neither half was judged so.
+        """
+        alone = all(each is step or each.fit is not step.fit for each in self.steps)
+        return step is self.steps[-1] and step.fit is self.fit and alone
 
     def without(self, step: Addition) -> tuple[Addition, ...]:
         """All steps but one."""
@@ -182,7 +186,7 @@ class Passes:
             row
             for row in found.ranking
             if row.fit is not None and row.candidate.name not in kept.names
-            and row.kind in (Kind.EFFECT, own.kind)
+            and row.candidate.singles == (row.candidate,) and row.kind in (Kind.EFFECT, own.kind)
         ]  # fmt: skip
         tied = [row for row in others if row.candidate.name in own.tied_with]
         return tied[:MOST_RIVALS] or others[:1]

@@ -34,7 +34,10 @@ def ranked(
     together = [each.candidate.name for each in group]
     names, crowd = together[:LARGEST_TIE], tuple(together[LARGEST_TIE:])
     tied = {name: tuple(n for n in names if n != name) for name in names}
-    rows = {r.candidate.name: _refitted(problem, r, by_name, tied) for r in refits}
+    rows = {
+        r.candidate.name: refitted_row(problem, r, tied, by_name.get(r.candidate.name))
+        for r in refits
+    }
     if crowd:
         rows[names[0]] = replace(rows[names[0]], crowd=crowd)
     order = [*together, *(name for name in rows if name not in together)]
@@ -87,14 +90,18 @@ def predicts_row(row: Ranked) -> bool:
     return HELD_OUT_REASON not in row.reasons
 
 
-def _refitted(
-    problem: Problem, each: Refit, profiles: dict[str, Profile], tied: dict[str, tuple[str, ...]]
+def refitted_row(
+    problem: Problem,
+    each: Refit,
+    tied: Mapping[str, tuple[str, ...]],
+    profile: Profile | None = None,
 ) -> Ranked:
+    """The row of a refit; a single effect has the profile of its scan, a parameter has none."""
     against = reasons_against(problem.base, each)
-    profile = profiles.get(each.candidate.name)
+    pair = len(each.candidate.singles) > 1
     return Ranked(
         candidate=each.candidate,
-        kind=Kind.EFFECT if profile else Kind.PARAMETER,
+        kind=Kind.EFFECT if profile or pair else Kind.PARAMETER,
         size=each.size,
         drop_train=each.drop_train,
         drop_validation=each.drop_validation,

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from math import nan
 
 import numpy as np
 
@@ -112,15 +113,17 @@ def refit_shift(problem: Problem, shift: Shift, to_beat: float = 0.0) -> Refit:
 
 def _refit(problem: Problem, candidate: Candidate, fit: Fit, names: tuple[str, ...]) -> Refit:
     """A fit with a candidate, validated and measured against the base."""
-    before, validation = problem.base_validation, problem.validated(fit)
-    return Refit(
-        candidate=candidate,
-        fit=fit,
-        validation=validation,
-        size=sizes(fit, names),
-        drop_train=_drop(problem.base, fit),
-        drop_validation=held_out_drop(before, validation),
-        plain_validation=plain_ratio(before, validation),
+    found = Refit(candidate, fit, problem.validated(fit), sizes(fit, names), nan, nan, nan)
+    return counted_from(problem.base, problem.base_validation, found)
+
+
+def counted_from(base: Fit, held_out: Fit | None, found: Refit) -> Refit:
+    """The same refit, measured against a base on the training and on the held-out windows."""
+    return replace(
+        found,
+        drop_train=_drop(base, found.fit),
+        drop_validation=held_out_drop(held_out, found.validation),
+        plain_validation=plain_ratio(held_out, found.validation),
     )
 
 

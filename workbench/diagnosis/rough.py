@@ -42,13 +42,14 @@ class Rough:
     share: float
 
 
-def rough_fit(problem: Problem, profile: Profile) -> Rough:
-    """Fit the candidate of a profile from its best sizes, in a few steps."""
+def rough_fit(problem: Problem, profile: Profile, most: int = STARTS) -> Rough:
+    """Fit the candidate of a profile from its best sizes, at most ``most``, in a few steps."""
     candidate, base = profile.candidate, problem.base
     windows = windows_for(problem, candidate)
-    unknowns = _with_shape(problem, problem.unknowns(windows.plant, candidate), profile)
+    unknowns = problem.unknowns(windows.plant, *candidate.singles)
+    unknowns = _with_shape(problem, unknowns, profile)
     blind = blind_starts(base.windows.plant, base.derivatives)
-    started = _starts(problem, windows, unknowns, profile)
+    started = _starts(problem, windows, unknowns, profile, most)
     if blind:
         started = [[settled(windows, unknowns, point) for point in each] for each in started]
     begun = [points_costs(windows, unknowns, points).best for points in started]
@@ -66,9 +67,9 @@ def rough_fit(problem: Problem, profile: Profile) -> Rough:
 def windows_for(problem: Problem, candidate: Candidate) -> Windows:
     """The windows of the base, their plant with the states that a candidate needs."""
     windows = problem.base.windows
-    if candidate.strength in windows.plant.values:
+    if all(each.strength in windows.plant.values for each in candidate.singles):
         return windows
-    needed = [c.member for c in problem.added] + [candidate.member]
+    needed = [c.member for c in (*problem.added, *candidate.singles)]
     return windows.with_plant(staged(problem.whole, *needed))
 
 
@@ -79,17 +80,17 @@ def _with_shape(problem: Problem, unknowns: Unknowns, profile: Profile) -> Unkno
     return replace(unknowns, held={**unknowns.held, **shape})
 
 
-def _distinct(trials: tuple[Trial, ...]) -> list[Trial]:
-    """The best trial, and the next one where the scan found it nearly as good."""
+def _distinct(trials: tuple[Trial, ...], most: int) -> list[Trial]:
+    """The best trial, and the next ones where the scan found them nearly as good."""
     chosen = [trials[0]]
     for trial in trials[1:]:
-        if len(chosen) < STARTS and trial.drop > 0.3 * trials[0].drop:
+        if len(chosen) < most and trial.drop > 0.3 * trials[0].drop:
             chosen.append(trial)
     return chosen
 
 
 def _starts(
-    problem: Problem, windows: Windows, unknowns: Unknowns, profile: Profile
+    problem: Problem, windows: Windows, unknowns: Unknowns, profile: Profile, most: int
 ) -> list[list[Point]]:
     """Points near the base, and where it has moved far points at the priors.
 
@@ -105,7 +106,7 @@ def _starts(
         values = {**windows.plant.values, **nominal, **trial.values}
         return Point(unknowns.clipped(unknowns.scaled(values)), starts)
 
-    trials = _distinct(profile.trials)
+    trials = _distinct(profile.trials, most)
     near = [point(base.point.t + share * t.nuisance, t) for t in trials for share in SHARES]
     own = np.array([name in {c.strength for c in problem.added} for name in base.unknowns.names])
     at_priors = np.where(own, base.point.t, 0.0)

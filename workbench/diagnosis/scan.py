@@ -21,7 +21,7 @@ Source: diagnosis.md 1.4.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import product
 
 import numpy as np
@@ -64,12 +64,14 @@ class Profile:
 
     signature       what it does to the residual that nothing else can, (rows,)
     compensation    share of its effect that the fitted parameters can imitate, R^2
+    changes         what each trial does to the projected residual, (n_trials, rows)
     """
 
     candidate: Candidate
     trials: tuple[Trial, ...]
     signature: np.ndarray
     compensation: float
+    changes: np.ndarray = field(repr=False)
 
     @property
     def drop(self) -> float:
@@ -122,6 +124,19 @@ class Metric:
         imitated = float(along @ np.linalg.solve(self.normal.hessian, along)) if len(along) else 0.0
         return max(float(change @ change) - imitated, 0.0)
 
+    def gram(self, changes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(D'MD, D'Mr) of changes D as rows (n, rows), with the prior's offset in the second.
+
+        An amount a of each costs c(a) = c(0) + 2 a'D'Mr + a'D'MD a.
+        """
+        flat = self._columns
+        along = changes @ flat
+        gram, slope = changes @ changes.T, changes @ self.normal.residual.ravel()
+        if not flat.shape[1]:
+            return gram, slope
+        solved = np.linalg.solve(self.normal.hessian, np.c_[along.T, self.normal.gradient])
+        return gram - along @ solved[:, :-1], slope - along @ solved[:, -1]
+
     @property
     def _columns(self) -> np.ndarray:
         J = self.normal.derivatives
@@ -145,6 +160,16 @@ def metric_at(
     return Metric(at, normal_equations(at, unknowns))
 
 
+def every_second(
+    windows: Windows, unknowns: Unknowns, point: Point, at: Linearised | None = None
+) -> tuple[Windows, Point, Metric, float]:
+    """Every second window where there are many: (windows, point, metric, how many each counts)."""
+    total = len(windows)
+    windows, kept = windows.part(max(total // 2, FEWEST_WINDOWS))
+    point, at = replace(point, starts=point.starts[:, kept]), at.part(kept) if at else None
+    return windows, point, metric_at(windows, unknowns, point, at), total / len(windows)
+
+
 def scan(
     whole: Plant,
     windows: Windows,
@@ -161,11 +186,7 @@ def scan(
     derivatives at the point where they are known already.  Every second window is enough to tell
     candidates apart where there are many; drops count as of all.
     """
-    total = len(windows)
-    windows, kept = windows.part(max(total // 2, FEWEST_WINDOWS))
-    of_all = total / len(windows)
-    point, at = replace(point, starts=point.starts[:, kept]), at.part(kept) if at else None
-    metric = metric_at(windows, unknowns, point, at)
+    windows, point, metric, of_all = every_second(windows, unknowns, point, at)
     blind = blind_starts(windows.plant, metric.at)
     values = unknowns.values(point.t)
     kept = [effect.name for effect in windows.plant.effects if effect.absent]
@@ -232,8 +253,10 @@ def _profiles(
     for pairs in found.values():
         pairs.sort(key=lambda pair: -pair[0].drop)
         best, row = pairs[0]
-        signature, share = metric.signature(metric.normal.residual - row)
-        profiles.append(Profile(best.candidate, tuple(t for t, _ in pairs), signature, share))
+        signature, share = metric.signature(as_it_is - row)
+        changes = np.array([(row - as_it_is).ravel() for _, row in pairs], dtype=np.float32)
+        trials = tuple(trial for trial, _ in pairs)
+        profiles.append(Profile(best.candidate, trials, signature, share, changes))
     return profiles
 
 

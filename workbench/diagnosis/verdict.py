@@ -63,8 +63,10 @@ def sentence(verdict: Verdict, ranking: tuple[Ranked, ...], law: Law | None) -> 
         return _too_weak(ranking)
     if leader is None or verdict not in NAMING:
         return "nothing in the catalogue earns its place"
-    name, share = leader.candidate.name, f"{leader.drop_train:.0%}"
+    name, share = _spoken(leader), f"{leader.drop_train:.0%}"
     if verdict is Verdict.FOUND:
+        if len(leader.candidate.singles) > 1:
+            return f"{name} are missing: they remove {share} of the misfit beyond noise"
         return f"{name} is missing: it removes {share} of the misfit beyond noise"
     if verdict is Verdict.SMALL_PROXY:
         return f"{name} explains {share} of the misfit and may stand for something else"
@@ -73,11 +75,17 @@ def sentence(verdict: Verdict, ranking: tuple[Ranked, ...], law: Law | None) -> 
     return f"{name} ({share} of the misfit), not to be told here from {', '.join(leader.tied_with)}"
 
 
+def _spoken(row: Ranked) -> str:
+    """The name of a candidate in a sentence."""
+    names = " and ".join(each.name for each in row.candidate.singles)
+    return f"{names} together" if len(row.candidate.singles) > 1 else names
+
+
 def _too_weak(ranking: tuple[Ranked, ...]) -> str:
     leader = ranking[0]
     if leader.accepted:
         rivals = ", ".join((*leader.tied_with, *leader.crowd))
-        return f"{leader.candidate.name} and {rivals} do the same to this recording"
+        return f"{_spoken(leader)} and {rivals} do the same to this recording"
     blind = [row.candidate.name for row in ranking if row.blind]
     names = ", ".join(blind[:BLIND_SHOWN])
     more = f" and {len(blind) - BLIND_SHOWN} more" if len(blind) > BLIND_SHOWN else ""
