@@ -115,6 +115,23 @@ def test_the_fit_percent_is_that_of_system_identification():
     assert found.rmse == pytest.approx(0.5)
 
 
+def test_the_squared_error_over_that_of_noise_stands_in_table_and_document(drive, bad):
+    comparison = Comparison(drive.name, (bad,))
+    (document,) = comparison_document(comparison)["recordings"]
+    said = comparison_text(comparison)
+
+    heavy = (bad.errors[FREE_RUN][POSITION].rmse / NOISE[POSITION]) ** 2
+    assert document["errors"][FREE_RUN]["slide.position"]["chi2_per_sample"] == pytest.approx(heavy)
+    (row,) = [line for line in said.splitlines() if re.match(r"slide\.position +free run", line)]
+    assert row.split()[-1] == f"{heavy:.3g}"
+
+
+def test_what_only_noise_is_left_of_has_a_chi2_of_one():
+    noise = 0.1 * np.random.default_rng(5).standard_normal(4000)
+
+    assert signal_error(noise, np.zeros(4000), 0.1).chi2_per_sample == pytest.approx(1.0, abs=0.1)
+
+
 def test_missing_samples_count_for_nothing():
     y = np.array([1.0, np.nan, 3.0])
 

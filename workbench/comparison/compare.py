@@ -2,6 +2,8 @@
 
 The horizons are those of :mod:`workbench.comparison.horizons`.
 
+Beside each error stands chi2/n against the measured noise, which is one where only noise is left.
+
 Source: diagnosis.md 1.1; the fit percent is that of System Identification:
 100 (1 - |y - yhat| / |y - mean y|).
 """

@@ -19,6 +19,11 @@ class SignalError:
     fit_percent: float
     noise: float
 
+    @property
+    def chi2_per_sample(self) -> float:
+        """chi2/n = (RMSE / noise)^2: one where nothing but noise is left."""
+        return (self.rmse / self.noise) ** 2
+
 
 Errors = Mapping[str, Mapping[str, SignalError]]
 
