@@ -24,10 +24,10 @@ Errors = Mapping[str, Mapping[str, "SignalError"]]
 
 
 def diagnosis_text(found: Diagnosis, unit_of: Mapping[str, str]) -> str:
-    """Verdict, ranking, where it fails, and errors before and after.
+    """Verdict, ranking, where it fails, and errors before and after what is named.
 
-    ``unit_of`` gives the full name, with its unit, of each public output name; without it errors
-    are left out.
+    Where nothing is named, the errors stand as they are.  ``unit_of`` gives the full name, with its
+    unit, of each public output name; without it errors are left out.
     """
     parts = [f"verdict: {found.verdict.value}: {found.sentence}"]
     parts += [f"warning: {warning}" for warning in found.warnings]
@@ -36,8 +36,9 @@ def diagnosis_text(found: Diagnosis, unit_of: Mapping[str, str]) -> str:
         parts += ["", law_text(found.law)]
     if found.where:
         parts += ["", where_text(found)]
-    if found.after and unit_of:
-        parts += ["", before_after_text(found.before, found.after, unit_of)]
+    if unit_of:
+        told = before_after_text(found.before, found.after, unit_of)
+        parts += ["", told if found.after else errors_text(found.before, unit_of)]
     if found.next_recording:
         parts += ["", next_recording_text(found.next_recording)]
     return "\n".join(parts)
@@ -145,6 +146,23 @@ def before_after_text(before: Errors, after: Errors, unit_of: Mapping[str, str])
                 )
             )
     return columns(("set", "signal", "RMSE before", "after", "fit % before", "after"), rows)
+
+
+def errors_text(sets: Errors, unit_of: Mapping[str, str]) -> str:
+    """RMSE, fit and noise of each output as they are, on each set."""
+    rows = [
+        (
+            label,
+            name,
+            shown(error.rmse, unit_of.get(name, name)),
+            number(error.fit_percent, 3),
+            shown(error.noise, unit_of.get(name, name), 2),
+            number(error.chi2_per_sample, 3),
+        )
+        for label, row in sets.items()
+        for name, error in row.items()
+    ]
+    return columns(("set", "signal", "RMSE", "fit %", "noise", "chi2/n"), rows)
 
 
 def spread(value: float, deviation: float, name: str) -> str:
