@@ -129,6 +129,7 @@ def signal(error: SignalError, name: str) -> Document:
         "fit_percent": plain(error.fit_percent),
         "noise": plain(error.noise),
         "chi2_per_sample": plain(error.chi2_per_sample),
+        "left_out": error.left_out,
     }
 
 

@@ -130,7 +130,7 @@ def where_text(found: Diagnosis) -> str:
 
 
 def before_after_text(before: Errors, after: Errors, unit_of: Mapping[str, str]) -> str:
-    """RMSE and fit of each output before and after, on each set."""
+    """RMSE and fit of each output before and after, on each set, and what they leave out."""
     rows = []
     for label in before:
         for name, old in before[label].items():
@@ -145,7 +145,19 @@ def before_after_text(before: Errors, after: Errors, unit_of: Mapping[str, str])
                     number(new.fit_percent, 3) if new else "-",
                 )
             )
-    return columns(("set", "signal", "RMSE before", "after", "fit % before", "after"), rows)
+    table = columns(("set", "signal", "RMSE before", "after", "fit % before", "after"), rows)
+    return "\n".join((table, *_left_out(before, " before"), *_left_out(after, " after")))
+
+
+def _left_out(sets: Errors, when: str = "") -> list[str]:
+    """What the errors do not count, in words."""
+    return [
+        f"{label}{when}: {name} could not be simulated for {error.left_out} samples, "
+        "which its RMSE leaves out"
+        for label, row in sets.items()
+        for name, error in row.items()
+        if error.left_out
+    ]
 
 
 def errors_text(sets: Errors, unit_of: Mapping[str, str]) -> str:
@@ -162,7 +174,8 @@ def errors_text(sets: Errors, unit_of: Mapping[str, str]) -> str:
         for label, row in sets.items()
         for name, error in row.items()
     ]
-    return columns(("set", "signal", "RMSE", "fit %", "noise", "chi2/n"), rows)
+    table = columns(("set", "signal", "RMSE", "fit %", "noise", "chi2/n"), rows)
+    return "\n".join((table, *_left_out(sets)))
 
 
 def spread(value: float, deviation: float, name: str) -> str:

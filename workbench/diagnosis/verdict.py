@@ -37,14 +37,20 @@ def judged(
 
 
 def far_above_noise(held_out: Fit | None) -> list[str]:
-    """Outputs whose held-out error without any addition is far above their noise, in words."""
+    """Outputs whose held-out error without any addition is far above their noise, in words.
+
+    What could not be simulated is far from anything.
+    """
     if held_out is None:
         return []
-    return [
+    errors = errors_of(held_out, None)["train"].items()
+    missed = [
         f"{name} {error.rmse / error.noise:.0f} times its noise"
-        for name, error in errors_of(held_out, None)["train"].items()
+        for name, error in errors
         if error.rmse > FAR_ABOVE_NOISE * error.noise
     ]
+    lost = [f"{n} not simulated for {e.left_out} samples" for n, e in errors if e.left_out]
+    return [*missed, *lost]
 
 
 def unexplained(far: Sequence[str], verdict: Verdict) -> tuple[str, ...]:
