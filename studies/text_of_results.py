@@ -91,10 +91,7 @@ def law_text(law: Law) -> str:
 
 def sizes_text(row: Ranked) -> str:
     """Strength and forms with their standard deviations."""
-    sizes = (
-        f"{shown(size.value, name, 3)} ± {shown(size.deviation, name, 2)}"
-        for name, size in row.size.items()
-    )
+    sizes = (spread(size.value, size.deviation, name, 3) for name, size in row.size.items())
     return ", ".join(sizes) or "-"
 
 
@@ -178,10 +175,10 @@ def errors_text(sets: Errors, unit_of: Mapping[str, str]) -> str:
     return "\n".join((table, *_left_out(sets)))
 
 
-def spread(value: float, deviation: float, name: str) -> str:
+def spread(value: float, deviation: float, name: str, digits: int = 4) -> str:
     """A quantity with its standard deviation, where it has one."""
     known = f" ± {shown(deviation, name, 2)}" if isfinite(deviation) else ""
-    return shown(value, name) + known
+    return shown(value, name, digits) + known
 
 
 def unit_names(outputs: tuple[str, ...]) -> dict[str, str]:
@@ -193,7 +190,7 @@ def addition_text(found: Addition, unit_of: Mapping[str, str]) -> str:
     """Errors before and after on both sets, and the parameters that moved."""
     drops = f"misfit removed: {percent(found.drop_train, 1)} of training"
     if isfinite(found.drop_validation):
-        drops += f", {percent(found.drop_validation, 1)} of validation"
+        drops += f", {percent(found.drop_validation, 1)} of {found.evidence.value}"
     parameters = moved_text(found.parameters)
     errors = before_after_text(found.before, found.after, unit_of)
     return "\n".join((errors, drops, "", parameters))
