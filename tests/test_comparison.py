@@ -4,6 +4,7 @@ import csv
 import json
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from studies.documents import comparison_document
 from studies.figures.comparison import comparison_figures
 from studies.figures.style import save
 from studies.text_of_comparison import comparison_text
-from workbench.comparison import compare
+from workbench.comparison import compare, horizons
 from workbench.comparison.compare import (
     FREE_RUN,
     ONE_STEP,
@@ -31,6 +32,7 @@ from workbench.rig import default_rig
 
 DT = 1e-3
 POSITION, PRESSURE = "slide.position_m", "chamber_a.pressure_pa"
+FOUND_NOTHING = SimpleNamespace(states=None)
 NOISE = {POSITION: 5e-6, PRESSURE: 400.0, "chamber_b.pressure_pa": 400.0}
 
 
@@ -185,6 +187,22 @@ def test_a_recording_shorter_than_a_window_says_so(drive, recording):
 
     assert WINDOW not in found.errors
     assert "window" in found.notes[0]
+
+
+def test_what_fails_in_the_windows_is_not_taken_for_a_short_recording(
+    drive, recording, monkeypatch
+):
+    def broken(*_):
+        raise ValueError("a bug")
+
+    monkeypatch.setattr(horizons, "_filtered", lambda *_: FOUND_NOTHING)
+    monkeypatch.setattr(horizons, "_one_step", lambda *_: {PRESSURE: np.zeros(len(recording))})
+    monkeypatch.setattr(horizons, "_free_run", lambda *_: dict.fromkeys(drive.plant.model.states))
+    monkeypatch.setattr(horizons, "_windows", broken)
+    course = SimpleNamespace(plant=drive.fit_for(recording), recording=recording)
+
+    with pytest.raises(ValueError, match="a bug"):
+        horizons.foretold(course, NOISE)
 
 
 def test_a_plant_without_states_is_compared_sample_by_sample():

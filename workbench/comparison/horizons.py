@@ -19,7 +19,7 @@ from workbench.comparison.course import Course
 from workbench.filtering import FilterResult, filter_pass, recording_filter
 from workbench.fitting.start_states import refit_starts
 from workbench.fitting.window_length import window_length_s
-from workbench.fitting.windows import Windows, cut_windows
+from workbench.fitting.windows import TooShortError, Windows, cut_windows
 from workbench.plant import Plant
 from workbench.recording import Recording
 from workbench.simulation import simulate
@@ -46,11 +46,12 @@ def foretold(course: Course, noise: Mapping[str, float]) -> tuple[dict[str, Rows
     except ArithmeticError as error:
         notes.append(f"no free run: {error}")
     try:
-        length_s = window_length_s(plant, [recording])
-        found[WINDOW], unsaid = _windows(cut_windows(plant, [recording], noise, length_s), paths)
-        notes += unsaid
-    except ValueError as error:
+        windows = cut_windows(plant, [recording], noise, window_length_s(plant, [recording]))
+    except TooShortError as error:
         notes.append(f"no windows: {error}")
+    else:
+        found[WINDOW], unsaid = _windows(windows, paths)
+        notes += unsaid
     if free:
         found[FREE_RUN] = {name: free[name] for name in plant.measured}
     return found, notes
