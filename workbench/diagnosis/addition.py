@@ -72,7 +72,7 @@ def add(
 
     Raises
     ------
-    KeyError
+    UnknownNameError
         If the plant has no such effect for these recordings, with the nearest name.
     ValueError
         If the effect is there already, only a shift of a parameter that is fitted anyway, fixed by
