@@ -20,7 +20,7 @@ from controllers.spec import replaced
 from linearize.modes import HybridModel
 from linearize.standard import standard_modes
 from workbench.contracts import Controller
-from workbench.errors import whole_file
+from workbench.errors import Message, UnknownNameError, listed, nearest, whole_file
 from workbench.plant import Plant
 from workbench.plant_files import as_it_came, plant_named, plant_text
 from workbench.rig_laws import laws_of, with_laws
@@ -48,13 +48,14 @@ def design(method: str, plant: Plant, numbers: Mapping[str, Any] | None = None) 
 
     Raises
     ------
-    KeyError
+    UnknownNameError
         If there is no such method.
     InputError
         If a number is unknown or makes no sense.
     """
     if method not in CONTROLLERS:
-        raise KeyError(f"no controller {method}; there is {', '.join(CONTROLLERS)}")
+        what = f"no controller {method}; there is {listed(CONTROLLERS)}"
+        raise UnknownNameError(Message(what, nearest=nearest(method, CONTROLLERS)))
     found = CONTROLLERS[method]
     spec = replaced(found.spec(), numbers or {}, method)
     hybrid = standard_modes(plant)
@@ -75,7 +76,7 @@ def read_design(path: Path) -> Design:
     ------
     ValueError
         If it is no TOML, or a table or a key is missing.
-    KeyError
+    UnknownNameError
         If it names something that does not exist.
     """
     try:

@@ -9,6 +9,7 @@ from linearize.equilibrium import OperatingPoint, operating_point
 from linearize.modes import HybridModel, Interval, hybrid_modes
 from linearize.reduction import DesignModel, closed_command
 from workbench.effects.forces import EndStops
+from workbench.errors import UnknownNameError
 from workbench.plant import Plant
 
 POSITION, VELOCITY = "slide.position_m", "slide.velocity_m_s"
@@ -95,10 +96,10 @@ def standard_modes(plant: Plant) -> HybridModel:
 
     Raises
     ------
-    KeyError
+    UnknownNameError
         If its kind has none.
     """
     if plant.name not in STANDARD_MODES:
         known = ", ".join(STANDARD_MODES)
-        raise KeyError(f"no standard modes for {plant.name}; there are some for {known}")
+        raise UnknownNameError(f"no standard modes for {plant.name}; there are some for {known}")
     return STANDARD_MODES[plant.name](plant)

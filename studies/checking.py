@@ -44,10 +44,9 @@ def check_rig(
 
     Raises
     ------
-    KeyError
-        If a scenario or an estimator does not exist.
     InputError
-        If the plant has no standard modes, or a design is for another plant.
+        If a scenario or an estimator does not exist, the plant has no standard modes, or a design
+        is for another plant.
     """
     names = tuple(scenarios) or tuple(SCENARIOS)
     require(names, SCENARIOS, "the list of scenarios")

@@ -14,6 +14,7 @@ from studies.closed_loop_metrics import Metrics, measure
 from studies.scenarios import SAMPLE_TIME_S, SCENARIOS, Scenario
 from workbench.closed_loop import Hardware, LoopRecord, close_loop
 from workbench.contracts import Controller, Estimator
+from workbench.errors import Message, UnknownNameError, listed, nearest
 from workbench.filtering import consistent_start
 from workbench.plant import Plant
 
@@ -51,11 +52,12 @@ def standard_estimator(name: str, plant: Plant, sample_time_s: float) -> Estimat
 
     Raises
     ------
-    KeyError
+    UnknownNameError
         If there is no such estimator.
     """
     if name not in ESTIMATORS:
-        raise KeyError(f"no estimator {name}; there is {', '.join(ESTIMATORS)}")
+        what = f"no estimator {name}; there is {listed(ESTIMATORS)}"
+        raise UnknownNameError(Message(what, nearest=nearest(name, ESTIMATORS)))
     hardware, lean = sensors(plant), plant.lean()
     coarse = {key: grid / 12**0.5 for key, grid in hardware.resolution.items()}
     noise = {key: float(np.hypot(s, coarse.get(key, 0.0))) for key, s in hardware.noise.items()}

@@ -130,6 +130,8 @@ def signal(error: SignalError, name: str) -> Document:
         "unit": si_unit(name),
         "fit_percent": plain(error.fit_percent),
         "noise": plain(error.noise),
+        "chi2_per_sample": plain(error.chi2_per_sample),
+        "left_out": error.left_out,
     }
 
 

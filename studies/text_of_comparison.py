@@ -40,7 +40,7 @@ def _recording_text(each: RecordingComparison) -> str:
 
 def _errors(each: RecordingComparison) -> str:
     return columns(
-        ("signal", "horizon", "RMSE", "fit %", "noise"),
+        ("signal", "horizon", "RMSE", "fit %", "noise", "chi2/n"),
         [
             (
                 public_name(name),
@@ -48,6 +48,7 @@ def _errors(each: RecordingComparison) -> str:
                 shown(error.rmse, name),
                 number(error.fit_percent, 3),
                 shown(error.noise, name, 2),
+                number(error.chi2_per_sample, 3),
             )
             for name in each.measured
             for horizon, row in each.errors.items()

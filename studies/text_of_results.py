@@ -24,10 +24,10 @@ Errors = Mapping[str, Mapping[str, "SignalError"]]
 
 
 def diagnosis_text(found: Diagnosis, unit_of: Mapping[str, str]) -> str:
-    """Verdict, ranking, where it fails, and errors before and after.
+    """Verdict, ranking, where it fails, and errors before and after what is named.
 
-    ``unit_of`` gives the full name, with its unit, of each public output name; without it errors
-    are left out.
+    Where nothing is named, the errors stand as they are.  ``unit_of`` gives the full name, with its
+    unit, of each public output name; without it errors are left out.
     """
     parts = [f"verdict: {found.verdict.value}: {found.sentence}"]
     parts += [f"warning: {warning}" for warning in found.warnings]
@@ -36,8 +36,9 @@ def diagnosis_text(found: Diagnosis, unit_of: Mapping[str, str]) -> str:
         parts += ["", law_text(found.law)]
     if found.where:
         parts += ["", where_text(found)]
-    if found.after and unit_of:
-        parts += ["", before_after_text(found.before, found.after, unit_of)]
+    if unit_of:
+        told = before_after_text(found.before, found.after, unit_of)
+        parts += ["", told if found.after else errors_text(found.before, unit_of)]
     if found.next_recording:
         parts += ["", next_recording_text(found.next_recording)]
     return "\n".join(parts)
@@ -90,10 +91,7 @@ def law_text(law: Law) -> str:
 
 def sizes_text(row: Ranked) -> str:
     """Strength and forms with their standard deviations."""
-    sizes = (
-        f"{shown(size.value, name, 3)} ± {shown(size.deviation, name, 2)}"
-        for name, size in row.size.items()
-    )
+    sizes = (spread(size.value, size.deviation, name, 3) for name, size in row.size.items())
     return ", ".join(sizes) or "-"
 
 
@@ -129,7 +127,7 @@ def where_text(found: Diagnosis) -> str:
 
 
 def before_after_text(before: Errors, after: Errors, unit_of: Mapping[str, str]) -> str:
-    """RMSE and fit of each output before and after, on each set."""
+    """RMSE and fit of each output before and after, on each set, and what they leave out."""
     rows = []
     for label in before:
         for name, old in before[label].items():
@@ -144,13 +142,43 @@ def before_after_text(before: Errors, after: Errors, unit_of: Mapping[str, str])
                     number(new.fit_percent, 3) if new else "-",
                 )
             )
-    return columns(("set", "signal", "RMSE before", "after", "fit % before", "after"), rows)
+    table = columns(("set", "signal", "RMSE before", "after", "fit % before", "after"), rows)
+    return "\n".join((table, *_left_out(before, " before"), *_left_out(after, " after")))
 
 
-def spread(value: float, deviation: float, name: str) -> str:
+def _left_out(sets: Errors, when: str = "") -> list[str]:
+    """What the errors do not count, in words."""
+    return [
+        f"{label}{when}: {name} could not be simulated for {error.left_out} samples, "
+        "which its RMSE leaves out"
+        for label, row in sets.items()
+        for name, error in row.items()
+        if error.left_out
+    ]
+
+
+def errors_text(sets: Errors, unit_of: Mapping[str, str]) -> str:
+    """RMSE, fit and noise of each output as they are, on each set."""
+    rows = [
+        (
+            label,
+            name,
+            shown(error.rmse, unit_of.get(name, name)),
+            number(error.fit_percent, 3),
+            shown(error.noise, unit_of.get(name, name), 2),
+            number(error.chi2_per_sample, 3),
+        )
+        for label, row in sets.items()
+        for name, error in row.items()
+    ]
+    table = columns(("set", "signal", "RMSE", "fit %", "noise", "chi2/n"), rows)
+    return "\n".join((table, *_left_out(sets)))
+
+
+def spread(value: float, deviation: float, name: str, digits: int = 4) -> str:
     """A quantity with its standard deviation, where it has one."""
     known = f" ± {shown(deviation, name, 2)}" if isfinite(deviation) else ""
-    return shown(value, name) + known
+    return shown(value, name, digits) + known
 
 
 def unit_names(outputs: tuple[str, ...]) -> dict[str, str]:
@@ -162,7 +190,7 @@ def addition_text(found: Addition, unit_of: Mapping[str, str]) -> str:
     """Errors before and after on both sets, and the parameters that moved."""
     drops = f"misfit removed: {percent(found.drop_train, 1)} of training"
     if isfinite(found.drop_validation):
-        drops += f", {percent(found.drop_validation, 1)} of validation"
+        drops += f", {percent(found.drop_validation, 1)} of {found.evidence.value}"
     parameters = moved_text(found.parameters)
     errors = before_after_text(found.before, found.after, unit_of)
     return "\n".join((errors, drops, "", parameters))

@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 from commands import call
 
+from controllers.design_file import design
 from studies.command_line import ORDER
 from studies.command_line.application import answering, spread
 from workbench.causes import all_causes
+from workbench.errors import UnknownNameError
 from workbench.plants import PLANTS
 from workbench.reading import read_recording
 from workbench.rig import default_rig, load_rig
@@ -267,6 +269,8 @@ def test_options_take_several_values_in_a_row_behind_the_arguments():
     [
         (ArithmeticError("diverged"), 3),
         (ValueError("no"), 2),
+        (UnknownNameError("no such effect"), 2),
+        (KeyError("a bug's key"), 3),
         (KeyboardInterrupt(), 130),
         (StopIteration(), 3),
         (IndexError("list index out of range"), 3),
@@ -280,6 +284,18 @@ def test_what_goes_wrong_becomes_an_exit_code(error, code):
         raise error
 
     assert stopped.value.exit_code == code
+
+
+def test_an_unknown_name_reads_as_its_message_and_is_a_key_error(capsys):
+    import typer
+
+    with pytest.raises(KeyError) as refused:
+        design("lqq", default_rig("servo_drive").plant)
+    with pytest.raises(typer.Exit), answering(quiet=True):
+        raise refused.value
+
+    said = "no controller lqq; there is pid, lq, mpc; did you mean 'lq'?"
+    assert capsys.readouterr().err == f"workbench: {said}\n"
 
 
 def test_what_nobody_foresaw_is_one_line_and_its_trace_is_shown_when_asked(monkeypatch, capsys):

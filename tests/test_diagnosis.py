@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from studies.text_of_results import addition_text
 from workbench.diagnosis.diagnose import diagnose
 from workbench.diagnosis.improve import accept, add, improve
 from workbench.diagnosis.judge import alignment
@@ -96,6 +97,7 @@ def test_without_validation_the_verdict_is_at_most_a_tie_with_a_warning(rig):
 
     assert found.verdict is Verdict.TIE
     assert any("held out" in warning for warning in found.warnings)
+    assert found.sentence.endswith("judged on the last third of the training recordings")
 
 
 def test_the_training_recording_is_no_validation(rig):
@@ -103,6 +105,7 @@ def test_the_training_recording_is_no_validation(rig):
 
     assert found.verdict is Verdict.TIE
     assert any("proves nothing" in warning for warning in found.warnings)
+    assert found.sentence.endswith("judged on validation that repeats a training recording")
 
 
 def test_a_diagnosis_changes_nothing_and_says_the_same_twice(rig, found):
@@ -120,6 +123,7 @@ def test_adding_makes_the_error_fall_on_both_recordings(rig):
         before, after = (errors[part]["rod.force"].rmse for errors in (step.before, step.after))
         assert after < 0.2 * before
     assert step.rig.added == ("coulomb_friction",)
+    assert step.rig.notes[-1].endswith("in validation")
 
 
 def test_what_a_diagnosis_puts_first_can_be_accepted_as_it_was_fitted(rig, found):
@@ -163,7 +167,9 @@ def test_the_shape_that_the_scan_found_is_kept_by_the_refit(rig):
 
 def test_adding_without_validation_warns_and_improving_refuses(rig):
     with pytest.warns(UserWarning, match="no validation recording"):
-        add(rig, "coulomb_friction", [bench(1, coulomb)])
+        step = add(rig, "coulomb_friction", [bench(1, coulomb)])
+    assert step.rig.notes[-1].endswith("in the last third of the training recordings")
+    assert "of the last third of the training recordings" in addition_text(step, {})
     with pytest.raises(ValueError, match="needs a validation recording"):
         improve(rig, [bench(1, coulomb)], [])
 

@@ -1,16 +1,20 @@
 """Windows, noise, priors and the Gauss-Newton fit."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from studies.text_of_results import errors_text
+from workbench.fitting.errors import plain_ratio, signal_errors
 from workbench.fitting.gauss_newton import best_of_each, fit_windows, points_costs
 from workbench.fitting.linearised import Point
 from workbench.fitting.noise import measured_noise
 from workbench.fitting.start_states import refit_starts
 from workbench.fitting.starts import guessed_states
 from workbench.fitting.unknowns import Unknowns, nominal_unknowns
-from workbench.fitting.windows import cut_windows
-from workbench.plants import crr_arm, servo_drive
+from workbench.fitting.windows import UNSEEN_PENALTY, cut_windows
+from workbench.plants import crr_arm, cylinder_bench, servo_drive
 from workbench.recording import Recording
 from workbench.simulation import simulate
 
@@ -70,6 +74,34 @@ def test_missing_samples_have_no_weight(plant, recording):
 
     assert windows.count == 3 * 2000 - 50
     assert refit_starts(windows).chi2 / windows.count == pytest.approx(1.0, abs=0.15)
+
+
+def test_samples_that_could_not_be_simulated_are_counted_and_left_out_of_the_error():
+    rng, n = np.random.default_rng(8), 400
+    channels = {
+        "chamber.pressure_pa": np.full(n, 3e5),
+        "rod.position_m": np.full(n, 0.02),
+        "rod.velocity_m_s": np.zeros(n),
+        "rod.force_n": 20.0 + 0.2 * rng.standard_normal(n),
+    }
+    bench = cylinder_bench().lean()
+    windows = cut_windows(bench, [Recording("still", 1e-2, channels)], {"rod.force_n": 0.2})
+    fit = refit_starts(windows)
+    worse = fit.residual.copy()
+    worse[:, :3] = UNSEEN_PENALTY
+    rows = worse.transpose(1, 0, 2).reshape(len(windows), -1)
+    short = replace(fit, derivatives=replace(fit.derivatives, residual=rows))
+
+    (whole,), (part,) = (signal_errors(each).values() for each in (fit, short))
+    (none,) = signal_errors(refit_starts(windows, {"chamber.area_m2": 1e305})).values()
+
+    assert (whole.left_out, part.left_out) == (0, 3 * windows.length)
+    assert part.rmse == pytest.approx(whole.rmse, rel=0.05)
+    assert plain_ratio(fit, short) > 1.0
+    assert np.isnan(none.rmse) and none.left_out == windows.count == n
+    assert "rod.force could not be simulated for 60 samples" in errors_text(
+        {"train": {"rod.force": part}}, {"rod.force": "rod.force_n"}
+    )
 
 
 def test_start_states_near_a_hole_claim_no_more_than_they_know(plant, recording):

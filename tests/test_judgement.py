@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from test_diagnosis import bench, coulomb
 
+from studies.text_of_results import moved_text
 from workbench.comparison.regimes import regimes
+from workbench.diagnosis.addition import moved_parameters
 from workbench.diagnosis.diagnose import _followed, diagnose, silent
 from workbench.diagnosis.improve import add, improve
 from workbench.diagnosis.judge import SHARE_REASON, reasons_against, tie_group
@@ -136,6 +138,8 @@ def test_a_parameter_at_its_bound_is_no_shift():
 
     assert found.base.plant.values["friction.coulomb_force_n"] == 0.0
     assert "friction.coulomb_force_n" not in [shift.name for shift in shifts(found)]
+    (row,) = [r for r in moved_parameters(found.base) if r.name == "friction.coulomb_force_n"]
+    assert np.isnan(row.deviation) and moved_text([row]).endswith("0 N")
 
 
 def test_improve_writes_a_note_for_every_effect_it_added():

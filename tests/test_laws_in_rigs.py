@@ -23,6 +23,8 @@ from workbench.diagnosis.improvement import Change
 from workbench.diagnosis.result import Verdict
 from workbench.errors import InputError
 from workbench.fitting.fit import fit
+from workbench.parts import Supply
+from workbench.plants import closed_chamber
 from workbench.reading.writer import write_recording
 from workbench.recording import Recording
 from workbench.rig import default_rig, load_rig
@@ -155,6 +157,17 @@ def test_every_term_of_every_plant_acts_and_is_absent_at_null(plant):
         strength = lawful.candidates[name].strength
         typical = lawful.parameters[strength].typical
         assert not np.array_equal(rates_and_outputs({strength: typical}), at_null), name
+
+
+def test_a_term_over_the_supply_reads_it_by_its_own_name():
+    plant = closed_chamber()
+    name = "law[p/p_s]@chamber"
+    fed = replace(plant, parts=(*plant.parts, Supply(name="bottle")))
+    lawful = fed.with_effects(law_terms(fed)[name]).with_values({f"{name}.pressure_kg_s": 1e-4})
+    u, d, p = lawful.nominal
+
+    assert name not in law_terms(plant)
+    assert lawful.model.f(lawful.initial, u, d, p)[0].full().any()
 
 
 @pytest.mark.parametrize(

@@ -163,6 +163,16 @@ def test_an_empirical_law_comes_with_its_range():
     ) in said
 
 
+def test_where_nothing_is_named_the_errors_stand_as_they_are():
+    nothing = replace(diagnosis(Verdict.NOTHING_MISSING), after={})
+    rows = [line.split() for line in diagnosis_text(nothing, UNITS).splitlines()]
+
+    assert ["set", "signal", "RMSE", "fit", "%", "noise", "chi2/n"] in rows
+    assert ["train", "chamber_a.pressure", "0.08123", "bar", "71", "0.004", "bar", "412"] in rows
+    assert "RMSE before" in diagnosis_text(diagnosis(), UNITS)
+    assert "RMSE" not in diagnosis_text(nothing, {})
+
+
 def test_a_diagnosis_reads_in_the_units_of_people():
     said = diagnosis_text(diagnosis(), UNITS)
 

@@ -47,6 +47,12 @@ class InputError(ValueError):
         return type(self), self.messages
 
 
+class UnknownNameError(InputError, KeyError):
+    """A name that does not exist; to a program a KeyError, as of any mapping."""
+
+    __str__ = Exception.__str__  # that of KeyError shows the quotes of a string
+
+
 def nearest(name: object, known: Iterable[str]) -> str:
     """The known name that looks most like this one; empty where none does."""
     found = get_close_matches(str(name), list(known), n=1)

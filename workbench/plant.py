@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
 from functools import cached_property
 from math import inf
 from typing import Any
@@ -14,6 +13,7 @@ import casadi as ca
 import numpy as np
 
 from workbench.effect import Cause, Conditions, Effect, Expression, Parameter, Part, State, Term
+from workbench.errors import UnknownNameError, nearest
 from workbench.model import Model, flow_paths
 
 TOGETHER = " + "  # between the names of two effects that are put in together
@@ -296,15 +296,15 @@ def require(names: Iterable[str], known: Iterable[str], owner: str) -> None:
 
     Raises
     ------
-    KeyError
+    UnknownNameError
         Naming the first unknown name, the nearest known one and all known ones.
     """
     known = list(known)
     for name in names:
         if name not in known:
-            near = get_close_matches(name, known, n=1)
-            hint = f"; did you mean {near[0]}?" if near else ""
-            raise KeyError(f"{owner} has no {name}{hint} (it has {', '.join(known)})")
+            near = nearest(name, known)
+            hint = f"; did you mean {near}?" if near else ""
+            raise UnknownNameError(f"{owner} has no {name}{hint} (it has {', '.join(known)})")
 
 
 def _shared(cause: Cause, plant: Plant) -> bool:

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from workbench.errors import Message, UnknownNameError, nearest
+
 
 @dataclass(frozen=True)
 class Recording:
@@ -37,7 +39,8 @@ class Recording:
 
     def __getitem__(self, channel: str) -> np.ndarray:
         if channel not in self.channels:
-            raise KeyError(f"{self.name} has no {channel}; it has {', '.join(self.channels)}")
+            what = f"{self.name} has no {channel}; it has {', '.join(self.channels)}"
+            raise UnknownNameError(Message(what, nearest=nearest(channel, self.channels)))
         return self.channels[channel]
 
     def __len__(self) -> int:

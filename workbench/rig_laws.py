@@ -46,15 +46,16 @@ def law_terms(plant: Plant) -> dict[str, Effect]:
 
 
 def _terms(plant: Plant) -> Iterator[Effect]:
-    supplied = any(isinstance(part, Supply) for part in plant.parts)
+    supplies = [part.name for part in plant.parts if isinstance(part, Supply)]
     for part in plant.parts:
         if isinstance(part, Body | HeldRod | JointRod):
             yield from (kind(name=_named(kind, part.name), body=part.name) for kind in FORCES)
         elif isinstance(part, GasVolume):
             at = {"chamber": part.name}
             yield ConstantFlow(name=_named(ConstantFlow, part.name), **at)
-            if supplied:
-                yield PressureFlow(name=_named(PressureFlow, part.name), **at)
+            if supplies:  # of several, the first
+                name = _named(PressureFlow, part.name)
+                yield PressureFlow(name=name, **at, supply=supplies[0])
             if body := getattr(part, "body", None):
                 yield SpeedFlow(name=_named(SpeedFlow, part.name), **at, body=body)
 

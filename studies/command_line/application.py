@@ -90,7 +90,7 @@ def answering(quiet: bool = False) -> Iterator[Callable[[str], None]]:
         _stop(str(error), WRONG_INPUT)
     except (ArithmeticError, _linear_algebra_error()) as error:
         _stop(str(error), SOLVER_FAILED)
-    except (KeyError, ValueError) as error:
+    except ValueError as error:
         _stop(str(error.args[0]) if error.args else repr(error), WRONG_INPUT)
     except OSError as error:
         _stop(f"{error.filename or ''}: {error.strerror or error}".lstrip(": "), WRONG_INPUT)

@@ -2,6 +2,8 @@
 
 The horizons are those of :mod:`workbench.comparison.horizons`.
 
+Beside each error stands chi2/n against the measured noise, which is one where only noise is left.
+
 Source: diagnosis.md 1.1; the fit percent is that of System Identification:
 100 (1 - |y - yhat| / |y - mean y|).
 """
@@ -162,12 +164,13 @@ def _compared(rig: Rig, recording: Recording) -> RecordingComparison:
 def signal_error(measured: np.ndarray, simulated: np.ndarray, noise: float) -> SignalError:
     """RMSE, fit percent and noise over the samples that both have; NaN where there is none."""
     both = np.isfinite(measured) & np.isfinite(simulated)
+    left_out = int(np.sum(np.isfinite(measured) & ~both))
     if not both.any():
-        return SignalError(np.nan, np.nan, noise)
+        return SignalError(np.nan, np.nan, noise, left_out)
     y, error = measured[both], (measured - simulated)[both]
     spread = float(np.linalg.norm(y - y.mean()))
     fit = 100.0 * (1.0 - float(np.linalg.norm(error)) / spread) if spread > 0 else np.nan
-    return SignalError(float(np.sqrt(np.mean(error**2))), fit, noise)
+    return SignalError(float(np.sqrt(np.mean(error**2))), fit, noise, left_out)
 
 
 def _first_of(wanted: Sequence[str], simulated: Mapping[str, Rows]) -> str:

@@ -58,5 +58,5 @@ def _simulated(plant: Plant, piece: Recording) -> dict[str, np.ndarray]:
 def _error(rows: list[np.ndarray], noise: float) -> SignalError:
     measured, simulated = np.hstack(rows)
     if np.isnan(simulated).any():
-        return SignalError(float("nan"), float("nan"), noise)
+        return SignalError(np.nan, np.nan, noise, int(np.isfinite(measured).sum()))
     return signal_error(measured, simulated, noise)

@@ -19,7 +19,7 @@ from workbench.comparison.course import Course
 from workbench.filtering import FilterResult, filter_pass, recording_filter
 from workbench.fitting.start_states import refit_starts
 from workbench.fitting.window_length import window_length_s
-from workbench.fitting.windows import Windows, cut_windows
+from workbench.fitting.windows import TooShortError, Windows, cut_windows
 from workbench.plant import Plant
 from workbench.recording import Recording
 from workbench.simulation import simulate
@@ -46,10 +46,12 @@ def foretold(course: Course, noise: Mapping[str, float]) -> tuple[dict[str, Rows
     except ArithmeticError as error:
         notes.append(f"no free run: {error}")
     try:
-        length_s = window_length_s(plant, [recording])
-        found[WINDOW] = _windows(cut_windows(plant, [recording], noise, length_s), paths)
-    except ValueError as error:
+        windows = cut_windows(plant, [recording], noise, window_length_s(plant, [recording]))
+    except TooShortError as error:
         notes.append(f"no windows: {error}")
+    else:
+        found[WINDOW], unsaid = _windows(windows, paths)
+        notes += unsaid
     if free:
         found[FREE_RUN] = {name: free[name] for name in plant.measured}
     return found, notes
@@ -58,12 +60,17 @@ def foretold(course: Course, noise: Mapping[str, float]) -> tuple[dict[str, Rows
 def lost(recording: Recording, ahead: Rows) -> list[str]:
     """From when on the one-step filter gave no numbers, in words."""
     recorded = np.isfinite(recording.rows(ahead)).any(axis=0)
-    missing = np.flatnonzero(recorded & ~np.isfinite([*ahead.values()]).any(axis=0))
-    if not len(missing):
-        return []
-    share, start_s = len(missing) / recorded.sum(), recording.sample_time_s * missing[0]
-    told = f"{100 * share:.0f} % of the samples, the first at {start_s:.4g} s"
-    return [f"one step: the filter gave nothing for {told}"]
+    missing = recorded & ~np.isfinite([*ahead.values()]).any(axis=0)
+    told = _where(missing, recorded, recording.sample_time_s)
+    return [f"one step: the filter gave nothing for {told}"] if told else []
+
+
+def _where(missing: np.ndarray, recorded: np.ndarray, sample_time_s: float) -> str:
+    """How many of the recorded samples are missing, and from when on; both (n,)."""
+    if not missing.any():
+        return ""
+    share, start_s = missing.sum() / recorded.sum(), sample_time_s * np.argmax(missing)
+    return f"{100 * share:.3g} % of the samples, the first at {start_s:.4g} s"
 
 
 def _outputs(plant: Plant, recording: Recording) -> Rows:
@@ -93,8 +100,10 @@ def _one_step(recording: Recording, found: FilterResult) -> Rows:
     return {name: recording[name] - innovation for name, innovation in rows}
 
 
-def _windows(windows: Windows, paths: Sequence[np.ndarray]) -> Rows:
-    """Outputs of each window from its own start, (n,) with NaN outside of windows.
+def _windows(windows: Windows, paths: Sequence[np.ndarray]) -> tuple[Rows, list[str]]:
+    """Outputs of each window from its own start, and what could not be simulated in words.
+
+    Outputs (n,) are NaN outside of windows, and where a window could not be simulated.
 
     ``paths`` are states along the recording, (n_x, n) each, where a window may begin to look for
     its start: then it is no worse than a free run is there.
@@ -104,10 +113,17 @@ def _windows(windows: Windows, paths: Sequence[np.ndarray]) -> Rows:
     begun = [np.where(np.isfinite(each), each, windows.start) for each in begun]
     fit = refit_starts(windows, others=begun)
     simulated = windows.measured - fit.residual * windows.scale[:, :, None]
+    simulated[fit.unsimulated] = np.nan
     rows = np.full((len(simulated), len(recording)), np.nan)
+    lost, recorded = np.zeros((2, len(recording)), dtype=bool)
     for k, first in enumerate(firsts):
-        rows[:, first : first + windows.length] = simulated[:, k]
-    return dict(zip(windows.plant.measured, rows, strict=True))
+        here = slice(first, first + windows.length)
+        rows[:, here] = simulated[:, k]
+        lost[here] = fit.unsimulated[:, k].any(axis=0)
+        recorded[here] = np.isfinite(windows.measured[:, k]).any(axis=0)
+    told = _where(lost, recorded, recording.sample_time_s)
+    notes = [f"window: could not be simulated for {told}"] if told else []
+    return dict(zip(windows.plant.measured, rows, strict=True)), notes
 
 
 def _free_run(course: Course) -> Rows:

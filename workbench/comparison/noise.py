@@ -18,7 +18,7 @@ from math import comb
 
 import numpy as np
 
-from workbench.fitting.noise import BLOCK, measured_noise
+from workbench.fitting.noise import BLOCK, NoNoiseError, measured_noise
 from workbench.recording import Recording
 from workbench.units import public_name
 
@@ -68,7 +68,7 @@ def recorded_noise(recording: Recording, outputs: Iterable[str]) -> dict[str, No
 def _noise_of(recording: Recording, name: str) -> Noise:
     try:
         (value,) = measured_noise([recording], [name]).values()
-    except ValueError:
+    except NoNoiseError:
         seen = recording[name][np.isfinite(recording[name])]
         value = max(ASSUMED_SHARE * float(np.ptp(seen)) if len(seen) else 0.0, 1e-12)
         return Noise(name, value, NoiseSource.ASSUMED)

@@ -21,7 +21,7 @@ import numpy as np
 
 from workbench.fitting.error_model import ACTIVE
 from workbench.fitting.gauss_newton import Fit
-from workbench.fitting.noise import measured_noise
+from workbench.fitting.noise import NoNoiseError, measured_noise
 from workbench.fitting.starts import long_holes, sensed_states
 from workbench.fitting.window_cuts import cut_rows, received_windows, window_firsts, window_run
 from workbench.fitting.window_length import window_length_s
@@ -127,5 +127,5 @@ def _noise(recording: Recording, channel: str) -> float:
     """Noise of a channel, 0 where it shows none."""
     try:
         return measured_noise([recording], [channel])[channel]
-    except ValueError:
+    except NoNoiseError:
         return 0.0

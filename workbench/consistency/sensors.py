@@ -18,7 +18,7 @@ import numpy as np
 from workbench.consistency.explained import Probe, predicted_motion
 from workbench.consistency.findings import Finding, Weight
 from workbench.effects.forces import EndStops
-from workbench.fitting.noise import THIRD_DIFFERENCE_GAIN, measured_noise
+from workbench.fitting.noise import THIRD_DIFFERENCE_GAIN, NoNoiseError, measured_noise
 from workbench.fitting.window_cuts import evenly
 from workbench.plant import Plant
 from workbench.reading.plausible import stuck_stretch
@@ -148,7 +148,7 @@ def _jitter(recording: Recording, name: str) -> tuple[float, float]:
     """Standard deviation of the sampling instant in samples, and the finest that would show."""
     try:
         noise = measured_noise([replace(recording, noise={})], [name])[name]
-    except ValueError:
+    except NoNoiseError:
         return 0.0, np.inf
     third, slope = [], []
     for piece in recording.pieces:

@@ -7,17 +7,18 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 from workbench.consistency import checked
-from workbench.diagnosis.diagnose import WEAK_EVIDENCE, Progress, silent
+from workbench.diagnosis.diagnose import Progress, silent
+from workbench.diagnosis.evidence import WARNINGS, Recordings, held_out, weighed
 from workbench.diagnosis.law import empirical_law, plant_with_terms
 from workbench.diagnosis.pairs import pair_fit
 from workbench.diagnosis.refit import refit
-from workbench.diagnosis.result import Diagnosis, Law
+from workbench.diagnosis.result import Diagnosis, Evidence, Law
 from workbench.diagnosis.rough import rough_fit
 from workbench.diagnosis.scan import scan
 from workbench.fitting.errors import Errors, errors_of
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.posterior import fitted_rig, posterior_deviation
-from workbench.fitting.problem import NO_EVIDENCE, Problem, pose, proves_nothing, split
+from workbench.fitting.problem import Problem, pose
 from workbench.law_range import ranges_text
 from workbench.plant import TOGETHER, Candidate, Plant, require
 from workbench.recording import Recording
@@ -31,7 +32,8 @@ NO_LAW = "no empirical law of up to three terms passes every criterion"
 class Moved:
     """One parameter before and after: values, posterior and prior standard deviations in SI.
 
-    What was added has no prior: its ``prior_deviation`` is infinite.
+    What was added has no prior: its ``prior_deviation`` is infinite.  What ended at a bound has no
+    ``deviation``, NaN.
     """
 
     name: str
@@ -43,7 +45,10 @@ class Moved:
 
 @dataclass(frozen=True)
 class Addition:
-    """One effect added and fitted: the new rig, errors before and after, parameters."""
+    """One effect added and fitted: the new rig, errors before and after, parameters.
+
+    ``evidence`` says what its errors on held-out recordings are worth.
+    """
 
     rig: Rig
     candidate: Candidate
@@ -54,6 +59,7 @@ class Addition:
     parameters: tuple[Moved, ...]
     fit: Fit = field(repr=False)
     validation_fit: Fit | None = field(repr=False)
+    evidence: Evidence = Evidence.VALIDATION
 
 
 def add(
@@ -67,13 +73,13 @@ def add(
 
     Raises
     ------
-    KeyError
+    UnknownNameError
         If the plant has no such effect for these recordings, with the nearest name.
     ValueError
         If the effect is there already, only a shift of a parameter that is fitted anyway, fixed by
         the rig, or a change of something that the plant lacks; or if there are more than two.
     """
-    train, validation = _with_held_out(rig, train, validation)
+    train, validation, evidence = _with_held_out(rig, train, validation)
     if is_law(name):
         rig = replace(rig, plant=plant_with_terms(rig.plant, train, [name]))
     plant = rig.fit_for(train[0])
@@ -91,7 +97,8 @@ def add(
     found = refit(problem, begun)
     before = errors_of(base, problem.base_validation)
     drops = (found.drop_train, found.drop_validation)
-    return addition(rig, before, found.candidate, found.fit, found.validation, drops)
+    evidence = weighed(evidence, problem.base_validation)
+    return addition(rig, before, found.candidate, found.fit, found.validation, drops, evidence)
 
 
 def _names_in(name: str) -> list[str]:
@@ -126,27 +133,25 @@ def add_law(
     ValueError
         If none passes the criteria that an effect must pass.
     """
-    train, validation = _with_held_out(rig, train, validation)
+    train, validation, evidence = _with_held_out(rig, train, validation)
     progress("prior fit")
     problem = pose(rig, train, validation)
     progress("empirical law")
     law = empirical_law(problem)
     if law is None:
         raise ValueError(f"{rig.name}: {NO_LAW}")
-    return accept_law(rig, law, errors_of(problem.base, problem.base_validation))
+    evidence = weighed(evidence, problem.base_validation)
+    return accept_law(rig, law, errors_of(problem.base, problem.base_validation), evidence)
 
 
 def _with_held_out(
-    rig: Rig, train: Sequence[Recording], validation: Sequence[Recording]
-) -> tuple[Sequence[Recording], Sequence[Recording]]:
-    """Recordings to train on and to hold out: their last thirds where there are no others."""
-    train, validation = checked(rig, train, validation)
-    if validation:
-        if proves_nothing(train, validation):
-            warnings.warn(NO_EVIDENCE, stacklevel=3)
-        return train, validation
-    warnings.warn(WEAK_EVIDENCE, stacklevel=3)
-    return split(train)
+    rig: Rig, train: Recordings, validation: Recordings
+) -> tuple[Recordings, Recordings, Evidence]:
+    """As :func:`held_out` of recordings that fit the rig; warns where they prove little."""
+    train, validation, evidence = held_out(*checked(rig, train, validation))
+    if not evidence.strong:
+        warnings.warn(WARNINGS[evidence], stacklevel=3)
+    return train, validation, evidence
 
 
 def accept(rig: Rig, diagnosis: Diagnosis) -> Addition:
@@ -161,7 +166,15 @@ def accept(rig: Rig, diagnosis: Diagnosis) -> Addition:
     if best is None or best.fit is None:
         raise ValueError(f"{diagnosis.rig_name}: the diagnosis followed no candidate to a refit")
     drops = (best.drop_train, best.drop_validation)
-    return addition(rig, diagnosis.before, best.candidate, best.fit, best.validation, drops)
+    return addition(
+        rig,
+        diagnosis.before,
+        best.candidate,
+        best.fit,
+        best.validation,
+        drops,
+        diagnosis.evidence,
+    )
 
 
 def apart(step: Addition) -> tuple[Addition, ...]:
@@ -178,7 +191,9 @@ def apart(step: Addition) -> tuple[Addition, ...]:
     return tuple(halves)
 
 
-def accept_law(rig: Rig, law: Law, before: Errors) -> tuple[Addition, ...]:
+def accept_law(
+    rig: Rig, law: Law, before: Errors, evidence: Evidence = Evidence.VALIDATION
+) -> tuple[Addition, ...]:
     """The terms of an empirical law added to the rig one after the other, as they were fitted.
 
     ``before`` are the errors without any of them.
@@ -188,7 +203,7 @@ def accept_law(rig: Rig, law: Law, before: Errors) -> tuple[Addition, ...]:
         name, recordings = term.candidate.name, term.fit.windows.recordings
         rig = replace(rig, plant=plant_with_terms(rig.plant, recordings, [name]))
         drops = (term.drop_train, term.drop_validation)
-        step = addition(rig, before, term.candidate, term.fit, term.validation, drops)
+        step = addition(rig, before, term.candidate, term.fit, term.validation, drops, evidence)
         steps.append(step)
         rig = replace(freed(rig, step), notes=step.rig.notes)
         before = step.after
@@ -235,7 +250,7 @@ def freed(rig: Rig, step: Addition, own: Iterable[str] | None = None) -> Rig:
     if is_new(rig, step.candidate):
         return rig.with_added(plant, [step.candidate.name])
     known = dict(zip(unknowns.names, posterior_deviation(fit).tolist(), strict=True))
-    loosened = {**rig.deviations, **{name: known[name] for name in free}}
+    loosened = {**rig.deviations, **{n: known[n] for n in free if known[n] > 0.0}}
     return replace(rig, plant=plant, deviations=loosened)
 
 
@@ -251,8 +266,9 @@ def addition(
     before: Errors,
     candidate: Candidate,
     fit: Fit,
-    held_out: Fit | None,
+    unseen_fit: Fit | None,
     drops: tuple[float, float],
+    evidence: Evidence = Evidence.VALIDATION,
 ) -> Addition:
     """A fit with one more effect as an addition to the rig that it was fitted for."""
     share, unseen = drops
@@ -261,17 +277,18 @@ def addition(
     kind = ""
     if is_law(candidate.name):
         kind = f"empirical, not a physical effect, seen for {ranges_text(found.seen)}; "
-    falls = f"error {share:.0%} smaller in training, {unseen:.0%} in validation"
+    falls = f"error {share:.0%} smaller in training, {unseen:.0%} in {evidence.value}"
     return Addition(
         rig=replace(found, notes=(*rig.notes, f"{candidate.name}: {kind}{falls}")),
         candidate=candidate,
         before=before,
-        after=errors_of(fit, held_out),
+        after=errors_of(fit, unseen_fit),
         drop_train=share,
         drop_validation=unseen,
         parameters=moved_parameters(fit),
         fit=fit,
-        validation_fit=held_out,
+        validation_fit=unseen_fit,
+        evidence=evidence,
     )
 
 

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from workbench.comparison.regimes import regime_shares
 from workbench.consistency import trusted
 from workbench.diagnosis.credible import credible
+from workbench.diagnosis.evidence import WARNINGS, held_out, weighed
 from workbench.diagnosis.judge import (
     CERTAIN_SHARE,
     CLEARLY_LESS,
@@ -22,7 +23,6 @@ from workbench.diagnosis.judge import (
     SHARE_REASON,
     predicts,
     reasons_against,
-    too_few,
 )
 from workbench.diagnosis.law import empirical_law
 from workbench.diagnosis.next_recording import recommended
@@ -37,14 +37,7 @@ from workbench.diagnosis.verdict import far_above_noise, judged, sentence, unexp
 from workbench.diagnosis.where import acts_in, locate
 from workbench.effect import Kind
 from workbench.fitting.errors import errors_of
-from workbench.fitting.problem import (
-    NO_EVIDENCE,
-    Problem,
-    improved_base,
-    pose,
-    proves_nothing,
-    split,
-)
+from workbench.fitting.problem import Problem, improved_base, pose
 from workbench.fitting.windows import MOST_WINDOWS
 from workbench.recording import Recording
 from workbench.rig import Rig
@@ -56,10 +49,6 @@ WORTH_A_REFIT = 0.4  # of the best share of the first fits
 SHIFTS_REFITTED = 2  # parameters that leave their priors
 WORTH_A_SHIFT = 0.25  # of the best refit
 LOCATED = 2  # candidates that are followed because they act where the smoother finds a lack
-
-WEAK_EVIDENCE = "no validation recording: the last third is held out, which is weak evidence"
-
-FEW_WINDOWS = "what is held out is no more than a few slow decays, which is weak evidence"
 
 Progress = Callable[[str], None]
 
@@ -92,17 +81,12 @@ def diagnose(
     progress("the recordings against the rig")
     (train, validation), doubts = trusted(rig, train, validation)
     warnings = tuple(map(str, doubts))
-    held_out = bool(validation)
-    if not held_out:
-        train, validation = split(train)
-        warnings += (WEAK_EVIDENCE,)
-    elif proves_nothing(train, validation):
-        held_out = False
-        warnings += (NO_EVIDENCE,)
+    train, validation, evidence = held_out(train, validation)
     progress("prior fit")
     problem = pose(rig, train, validation, most_windows)
-    if too_few(problem.base_validation):
-        held_out, warnings = False, (*warnings, FEW_WINDOWS)
+    evidence = weighed(evidence, problem.base_validation)
+    if not evidence.strong:
+        warnings += (WARNINGS[evidence],)
     if not problem.base.converged:
         warnings += ("the prior fit did not converge: the ranking is provisional",)
     progress("where it fails")
@@ -119,7 +103,7 @@ def diagnose(
     ranking = with_pairs(problem, ranking, profiles, progress)
     law = _law(problem, ranking, profiles, progress)
     far = far_above_noise(problem.base_validation)
-    verdict = judged(ranking, law, held_out, far)
+    verdict = judged(ranking, law, evidence.strong, far)
     best = ranking[0] if verdict in NAMING else None
     if best and best.fit and not best.fit.converged:
         warnings += (f"the refit with {best.candidate.name} did not converge: its size may be off",)
@@ -129,7 +113,7 @@ def diagnose(
         Diagnosis(
             rig_name=rig.name,
             verdict=verdict,
-            sentence=sentence(verdict, ranking, law),
+            sentence=sentence(verdict, ranking, law, evidence),
             ranking=ranking,
             where=where,
             before=errors_of(problem.base, problem.base_validation),
@@ -139,6 +123,7 @@ def diagnose(
             base=problem.base,
             base_validation=problem.base_validation,
             next_recording=recommended(problem, verdict, ranking, progress),
+            evidence=evidence,
         ),
         doubts,
     )

@@ -194,7 +194,7 @@ def _with_law(
     best = last.ranking[0] if last.ranking else None
     if last.law is None or (best is not None and best.accepted):
         return done
-    for step in accept_law(current, last.law, last.before):
+    for step in accept_law(current, last.law, last.before, last.evidence):
         progress(f"empirical: {step.candidate.name}")
         done = replace(done, steps=(*done.steps, step))
         label = f"+ {step.candidate.name}"

@@ -17,9 +17,10 @@ from math import nan
 
 from workbench.diagnosis.addition import Addition, addition, assembled
 from workbench.diagnosis.diagnose import Progress
+from workbench.diagnosis.evidence import weighed
 from workbench.diagnosis.judge import CLEARLY_LESS, reasons_against
 from workbench.diagnosis.refit import Refit, refit, refit_from, refit_shift
-from workbench.diagnosis.result import Diagnosis, Ranked
+from workbench.diagnosis.result import Diagnosis, Evidence, Ranked
 from workbench.diagnosis.rough import rough_fit
 from workbench.diagnosis.scan import scan
 from workbench.diagnosis.shifts import shifts
@@ -195,9 +196,9 @@ class Passes:
         """What is kept with a rival in the place of an effect."""
         before = errors_of(problem.base, problem.base_validation)
         drops = (found.drop_train, found.drop_validation)
-        added = addition(
-            assembled(self.rig, rest), before, found.candidate, found.fit, found.validation, drops
-        )
+        evidence = weighed(Evidence.VALIDATION, problem.base_validation)
+        bare, fits = assembled(self.rig, rest), (found.fit, found.validation)
+        added = addition(bare, before, found.candidate, *fits, drops, evidence)
         return Kept((*rest, added), found.fit, found.validation)
 
 

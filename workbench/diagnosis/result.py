@@ -30,6 +30,20 @@ BLIND = 1.0  # typical sizes: what is not seen there is not seen
 NAMING = (Verdict.FOUND, Verdict.TIE, Verdict.SMALL_PROXY)
 
 
+class Evidence(Enum):
+    """What a held-out error is of: anything but another recording proves little."""
+
+    VALIDATION = "validation"
+    LAST_THIRD = "the last third of the training recordings"
+    REPEATED = "validation that repeats a training recording"
+    FEW = "validation of no more than a few slow decays"
+
+    @property
+    def strong(self) -> bool:
+        """True where it may prove something."""
+        return self is Evidence.VALIDATION
+
+
 class DecidedBy(Enum):
     """How far a candidate was followed."""
 
@@ -209,6 +223,7 @@ class Diagnosis:
     ``before`` and ``after`` map ``train`` and ``validation`` to errors by public output name.
     ``after`` belongs to what the verdict names, an effect or a law, and is empty without.
     ``base`` is the prior fit without any addition, ``base_validation`` the same on held-out data.
+    ``evidence`` says what that data is worth.
     ``next_recording`` is there where the verdict leaves a question open.
     """
 
@@ -224,6 +239,7 @@ class Diagnosis:
     base: Fit = field(repr=False)
     base_validation: Fit | None = field(repr=False)
     next_recording: NextRecording | None = None
+    evidence: Evidence = Evidence.VALIDATION
 
     @property
     def named(self) -> Ranked | None:

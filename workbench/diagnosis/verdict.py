@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from workbench.diagnosis.judge import SHARE_REASON
 from workbench.diagnosis.power import too_weak
-from workbench.diagnosis.result import NAMING, Law, Ranked, Verdict
+from workbench.diagnosis.result import NAMING, Evidence, Law, Ranked, Verdict
 from workbench.fitting.errors import errors_of
 from workbench.fitting.gauss_newton import Fit
 
@@ -37,14 +37,20 @@ def judged(
 
 
 def far_above_noise(held_out: Fit | None) -> list[str]:
-    """Outputs whose held-out error without any addition is far above their noise, in words."""
+    """Outputs whose held-out error without any addition is far above their noise, in words.
+
+    What could not be simulated is far from anything.
+    """
     if held_out is None:
         return []
-    return [
+    errors = errors_of(held_out, None)["train"].items()
+    missed = [
         f"{name} {error.rmse / error.noise:.0f} times its noise"
-        for name, error in errors_of(held_out, None)["train"].items()
+        for name, error in errors
         if error.rmse > FAR_ABOVE_NOISE * error.noise
     ]
+    lost = [f"{n} not simulated for {e.left_out} samples" for n, e in errors if e.left_out]
+    return [*missed, *lost]
 
 
 def unexplained(far: Sequence[str], verdict: Verdict) -> tuple[str, ...]:
@@ -54,8 +60,20 @@ def unexplained(far: Sequence[str], verdict: Verdict) -> tuple[str, ...]:
     return (f"unexplained errors remain on held-out windows: {', '.join(far)}",)
 
 
-def sentence(verdict: Verdict, ranking: tuple[Ranked, ...], law: Law | None) -> str:
-    """The verdict in words."""
+def sentence(
+    verdict: Verdict,
+    ranking: tuple[Ranked, ...],
+    law: Law | None,
+    evidence: Evidence = Evidence.VALIDATION,
+) -> str:
+    """The verdict in words, with what it was judged on where that is no other recording."""
+    said = _said(verdict, ranking, law)
+    if evidence.strong or verdict is Verdict.RECORDING_TOO_WEAK:
+        return said
+    return f"{said}, judged on {evidence.value}"
+
+
+def _said(verdict: Verdict, ranking: tuple[Ranked, ...], law: Law | None) -> str:
     leader = ranking[0] if ranking else None
     if verdict is Verdict.NOT_IN_CATALOGUE and law:
         return f"nothing in the catalogue: {law.text} (empirical, not a physical effect)"
@@ -71,7 +89,7 @@ def sentence(verdict: Verdict, ranking: tuple[Ranked, ...], law: Law | None) -> 
     if verdict is Verdict.SMALL_PROXY:
         return f"{name} explains {share} of the misfit and may stand for something else"
     if not leader.tied_with:
-        return f"{name} ({share} of the misfit), on no more than one recording"
+        return f"{name} ({share} of the misfit)"
     return f"{name} ({share} of the misfit), not to be told here from {', '.join(leader.tied_with)}"
 
 

@@ -137,13 +137,14 @@ class ConstantFlow(EmpiricalFlow):
 
 @dataclass(frozen=True, kw_only=True)
 class PressureFlow(EmpiricalFlow):
-    """mdot = w p / p_s."""
+    """mdot = w p / p_s, with the pressure of the supply."""
 
     causes = _cause("p/p_s", "pressure_kg_s", Balance.MASS)
+    supply: str = "supply"
     pressure_kg_s: Expression = strength(typical=1e-4, lower=-1e-2, upper=1e-2)
 
     def flow_kg_s(self, now: Conditions) -> Expression:
-        return self.pressure_kg_s * now[self.chamber].pressure_pa / now["supply"].pressure_pa
+        return self.pressure_kg_s * now[self.chamber].pressure_pa / now[self.supply].pressure_pa
 
 
 @dataclass(frozen=True, kw_only=True)

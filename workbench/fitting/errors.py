@@ -13,11 +13,21 @@ from workbench.units import public_name
 
 @dataclass(frozen=True)
 class SignalError:
-    """Error of one output over windows: RMSE in SI, fit percent and noise."""
+    """Error of one output: RMSE in SI, fit percent and noise.
+
+    ``left_out`` are the recorded samples that it does not count, because nothing could be simulated
+    there or, in a comparison, no window reaches them.
+    """
 
     rmse: float
     fit_percent: float
     noise: float
+    left_out: int = 0
+
+    @property
+    def chi2_per_sample(self) -> float:
+        """chi2/n = (RMSE / noise)^2: one where nothing but noise is left."""
+        return (self.rmse / self.noise) ** 2
 
 
 Errors = Mapping[str, Mapping[str, SignalError]]
@@ -26,18 +36,23 @@ Errors = Mapping[str, Mapping[str, SignalError]]
 def signal_errors(fit: Fit) -> dict[str, SignalError]:
     """RMSE and fit percent of each output over all windows, by public name.
 
-    Fit percent is MATLAB's 100 (1 - |y - yhat| / |y - mean(y)|), over windows with free start.
+    Samples that could not be simulated are counted, not mixed in; NaN where none could be.  Fit
+    percent is MATLAB's 100 (1 - |y - yhat| / |y - mean(y)|), over windows with free start.
     """
     windows = fit.windows
     error = fit.residual * windows.scale[:, :, None]
-    found = {}
+    found, lost = {}, fit.unsimulated
     for k, name in enumerate(windows.plant.measured):
-        seen = np.isfinite(windows.measured[k])
+        seen = np.isfinite(windows.measured[k]) & ~lost[k]
+        noise, left_out = float(windows.noise[k]), int(lost[k].sum())
+        if not seen.any():
+            found[public_name(name)] = SignalError(np.nan, np.nan, noise, left_out)
+            continue
         values, e = windows.measured[k][seen], error[k][seen]
         spread = float(np.linalg.norm(values - values.mean()))
-        percent = 100.0 * (1.0 - float(np.linalg.norm(e)) / spread) if spread else float("nan")
+        percent = 100.0 * (1.0 - float(np.linalg.norm(e)) / spread) if spread else np.nan
         rmse = float(np.sqrt(np.mean(e**2)))
-        found[public_name(name)] = SignalError(rmse, percent, float(windows.noise[k]))
+        found[public_name(name)] = SignalError(rmse, percent, noise, left_out)
     return found
 
 
@@ -51,12 +66,21 @@ def per_sample(fit: Fit | None) -> float:
 
 
 def plain_ratio(before: Fit | None, after: Fit | None) -> float:
-    """Squared error after over before, nothing capped: geometric mean over outputs, NaN without."""
+    """Squared error after over before, nothing capped: geometric mean over outputs, NaN without.
+
+    What could not be simulated counts with its penalty: a plant is no better for stopping short.
+    """
     if before is None or after is None:
         return float("nan")
-    old, new = signal_errors(before), signal_errors(after)
-    ratios = [new[name].rmse / max(old[name].rmse, 1e-300) for name in old]
+    ratios = _penalised_rmse(after) / np.maximum(_penalised_rmse(before), 1e-300)
     return float(np.exp(2.0 * np.mean(np.log(np.maximum(ratios, 1e-12)))))
+
+
+def _penalised_rmse(fit: Fit) -> np.ndarray:
+    """RMSE of each output in SI with the penalty of what could not be simulated, (n_y,)."""
+    windows = fit.windows
+    squares = ((fit.residual * windows.scale[:, :, None]) ** 2).sum(axis=(1, 2))
+    return np.sqrt(squares / np.maximum(np.isfinite(windows.measured).sum(axis=(1, 2)), 1))
 
 
 def errors_of(train: Fit, validation: Fit | None) -> Errors:

@@ -70,7 +70,7 @@ def fit(
 
     Raises
     ------
-    KeyError
+    UnknownNameError
         If ``only`` names what the plant does not have, with the nearest name.
     ValueError
         If ``only`` names nothing that is uncertain, or nothing at all is.

@@ -25,7 +25,7 @@ from workbench.fitting.linearised import (
     seen_at,
 )
 from workbench.fitting.unknowns import Unknowns
-from workbench.fitting.windows import Windows
+from workbench.fitting.windows import UNSEEN_PENALTY, Windows
 from workbench.plant import Plant
 
 LONGEST_STEP = 4.0  # of a scaled unknown in one step: beyond, the plant may be another one
@@ -74,6 +74,14 @@ class Fit:
         n_y, n, length = self.windows.measured.shape
         rows = self.derivatives.residual[:, : n_y * length]
         return rows.reshape(n, n_y, length).transpose(1, 0, 2)
+
+    @property
+    def unsimulated(self) -> np.ndarray:
+        """True for recorded samples that could not be simulated, (n_y, n_windows, L).
+
+        Their residual is a penalty, no error.
+        """
+        return np.abs(self.residual) == UNSEEN_PENALTY
 
 
 def fit_windows(

@@ -13,6 +13,10 @@ QUIET_SHARE = 0.3  # this share of the blocks is taken for still
 THIRD_DIFFERENCE_GAIN = 20.0  # variance of y3 - 3 y2 + 3 y1 - y0 over that of y
 
 
+class NoNoiseError(ValueError):
+    """A channel shows no noise, and no step that could stand for it."""
+
+
 def measured_noise(recordings: Iterable[Recording], channels: Iterable[str]) -> dict[str, float]:
     """Standard deviation of the noise of each channel.
 
@@ -22,7 +26,7 @@ def measured_noise(recordings: Iterable[Recording], channels: Iterable[str]) -> 
 
     Raises
     ------
-    ValueError
+    NoNoiseError
         If a channel has no noise at all and no step that could stand for it.
     """
     recordings = tuple(recordings)
@@ -39,7 +43,9 @@ def _noise_of(recordings: tuple[Recording, ...], channel: str) -> float:
     noise = max(quiet, _step(values) / np.sqrt(12.0))
     if noise > 0:
         return noise
-    raise ValueError(f"{channel}: the recording shows no noise; give it as noise = ... in the rig")
+    raise NoNoiseError(
+        f"{channel}: the recording shows no noise; give it as noise = ... in the rig"
+    )
 
 
 def _block_deviations(values: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from workbench.fitting.gauss_newton import Fit
-from workbench.fitting.linearised import normal_equations, rescaled
+from workbench.fitting.linearised import Normal, normal_equations, rescaled
 from workbench.law_range import seen_in
 from workbench.rig import Rig
 from workbench.rig_laws import laws_of
@@ -18,20 +18,33 @@ def posterior_deviation(fit: Fit) -> np.ndarray:
     """Standard deviation of each unknown from the curvature of the cost, shape (n_p,).
 
     Scales already carry the correlation time of the residuals, so no further inflation is due.
+    One that the fit holds at a bound has none, NaN: the curvature says nothing of it.
     """
-    return np.sqrt(np.maximum(np.diag(posterior_covariance(fit)), 0.0)) * fit.unknowns.scale
+    if not len(fit.unknowns):
+        return np.zeros(0)
+    normal = _normal(fit)
+    variance = np.maximum(np.diag(np.linalg.inv(normal.hessian)), 0.0)
+    return np.where(normal.precision > 0.0, np.sqrt(variance) * fit.unknowns.scale, np.nan)
 
 
 def posterior_covariance(fit: Fit) -> np.ndarray:
     """Covariance of the scaled unknowns from the curvature of the cost, shape (n_p, n_p).
 
-    Residuals are weighted by the error model of this very fit: the scales that it was fitted with
-    may belong to a plant that lacked something and was far worse.
+    One that the fit holds at a bound is as uncertain as its scale there, and of no other.
     """
     if not len(fit.unknowns):
         return np.zeros((0, 0))
+    return np.linalg.inv(_normal(fit).hessian)
+
+
+def _normal(fit: Fit) -> Normal:
+    """The quadratic model of the cost where a fit ended.
+
+    Residuals are weighted by the error model of this very fit: the scales that it was fitted with
+    may belong to a plant that lacked something and was far worse.
+    """
     at = rescaled(fit.derivatives, fit.windows, fit.windows.rescaled(fit.residual))
-    return np.linalg.inv(normal_equations(at, fit.unknowns).hessian)
+    return normal_equations(at, fit.unknowns)
 
 
 def fitted_rig(rig: Rig, fit: Fit, added: Sequence[str] = ()) -> Rig:

@@ -39,6 +39,10 @@ THREADS = 2
 SAME_CLOCK = 1e-4  # relative difference of sample times that counts as none
 
 
+class TooShortError(ValueError):
+    """No piece of a recording is as long as one window."""
+
+
 @dataclass(frozen=True)
 class Windows:
     """Windows of equal length out of one or more recordings.
@@ -233,8 +237,10 @@ def cut_windows(
 
     Raises
     ------
+    TooShortError
+        If no recording holds a whole window.
     ValueError
-        If no recording holds a whole window, or their sample times differ.
+        If their sample times differ.
     """
     recordings = tuple(recordings)
     one_clock(recordings)
@@ -242,7 +248,7 @@ def cut_windows(
     firsts = thinned(tuple(window_firsts(recording, length) for recording in recordings), most)
     if not any(firsts):
         names = ", ".join(recording.name for recording in recordings)
-        raise ValueError(f"{names}: no piece is as long as one window of {window_s:g} s")
+        raise TooShortError(f"{names}: no piece is as long as one window of {window_s:g} s")
     measured = np.concatenate(
         [
             cut_rows(recording.rows(plant.measured), own, length)
