@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from studies.text import columns, shown
+from workbench.candidate import TOGETHER
 from workbench.causes import all_causes, why_not
 from workbench.errors import InputError, Message, listed, nearest
-from workbench.plant import TOGETHER, Plant
+from workbench.plant import Plant
 from workbench.plant_files import plant_named
 from workbench.plants import PLANTS
 from workbench.rig import parameter_names

@@ -12,10 +12,11 @@ from workbench.units import public_name
 if TYPE_CHECKING:
     import numpy as np
 
-    from workbench.diagnosis.addition import Addition, Moved
+    from workbench.diagnosis.addition import Addition
     from workbench.diagnosis.result import Diagnosis, Law, NextRecording, Ranked
     from workbench.fitting.errors import SignalError
     from workbench.fitting.fit import FitReport
+    from workbench.fitting.posterior import Moved
 
 SHOWN_RANKS = 12
 CORRELATED = 0.9

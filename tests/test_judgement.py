@@ -8,7 +8,6 @@ from test_diagnosis import bench, coulomb
 
 from studies.text_of_results import moved_text
 from workbench.comparison.regimes import regimes
-from workbench.diagnosis.addition import moved_parameters
 from workbench.diagnosis.diagnose import _followed, diagnose, silent
 from workbench.diagnosis.improve import add, improve
 from workbench.diagnosis.judge import SHARE_REASON, reasons_against, tie_group
@@ -18,6 +17,7 @@ from workbench.diagnosis.shifts import shifts
 from workbench.diagnosis.verdict import judged, sentence
 from workbench.fitting.error_model import error_model
 from workbench.fitting.fit import fit
+from workbench.fitting.posterior import moved_parameters
 from workbench.fitting.problem import pose, split
 from workbench.fitting.window_length import window_length_s
 from workbench.plants.servo_drive import servo_drive

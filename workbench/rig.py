@@ -9,10 +9,11 @@ from functools import cached_property
 from math import inf
 from pathlib import Path
 
+from workbench.candidate import Candidate
 from workbench.causes import why_not
 from workbench.effect import Parameter
 from workbench.errors import InputError, Message, listed
-from workbench.plant import Candidate, Plant
+from workbench.plant import Plant
 from workbench.plant_files import plant_named
 from workbench.recording import Recording
 from workbench.recording_format import RecordingFormat, default_format, read_format
@@ -69,8 +70,9 @@ class Rig:
     def standard_deviation(self, parameter: str) -> float:
         """One standard deviation of a parameter by its full name, 0 where its value is known."""
         own = self.deviations.get(parameter)
-        value = self.plant.values[parameter]
-        return self.plant.parameters[parameter].standard_deviation(value) if own is None else own
+        if own is not None:
+            return own
+        return self.plant.parameters[parameter].standard_deviation(self.plant.values[parameter])
 
     @property
     def ambient_pa(self) -> float:
@@ -79,9 +81,9 @@ class Rig:
 
     def with_added(self, plant: Plant, names: Iterable[str]) -> Rig:
         """The rig with a plant in which more causes stand: free in a fit, and removed no longer."""
-        names = tuple(names)
-        removed = tuple(name for name in self.removed if name not in names)
-        return replace(self, plant=plant, added=(*self.added, *names), removed=removed)
+        added = (*self.added, *names)
+        removed = tuple(name for name in self.removed if name not in added)
+        return replace(self, plant=plant, added=added, removed=removed)
 
     def added_to(self, plant: Plant) -> tuple[Candidate, ...]:
         """The causes that the rig added, as far as this plant has a place for them."""
@@ -98,11 +100,11 @@ class Rig:
             If the recording has none of the outputs, or lacks a command or measured input.
         """
         plant, carried = self.plant, recording.channels
-        needed = [s.name for s in (*plant.commands, *plant.measured_inputs)]
+        needed = (s.name for s in (*plant.commands, *plant.measured_inputs))
         missing = [public_name(name) for name in needed if name not in carried]
         if missing:
-            what = f"{plant.name} needs {listed(missing)}"
-            raise InputError(Message(what, recording.name, f"besides {listed(carried)}"))
+            what, besides = f"{plant.name} needs {listed(missing)}", f"besides {listed(carried)}"
+            raise InputError(Message(what, recording.name, besides))
         given = tuple(s.name for s in plant.optional_inputs if s.name in carried)
         outputs = tuple(n for n in plant.measured + plant.optional_outputs if n in carried)
         if not outputs:
@@ -123,8 +125,7 @@ class Rig:
 
 def default_rig(plant: Plant | str) -> Rig:
     """What a rig file with only a name and a plant gives."""
-    if isinstance(plant, str):
-        plant = plant_named(plant)
+    plant = plant_named(plant) if isinstance(plant, str) else plant
     return Rig(name=plant.name, plant=plant, reader=default_format(plant))
 
 

@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
+from workbench.candidate import TOGETHER, Candidate
 from workbench.consistency import checked
 from workbench.diagnosis.diagnose import Progress, silent
 from workbench.diagnosis.evidence import WARNINGS, Recordings, held_out, weighed
@@ -17,30 +18,20 @@ from workbench.diagnosis.rough import rough_fit
 from workbench.diagnosis.scan import scan
 from workbench.fitting.errors import Errors, errors_of
 from workbench.fitting.gauss_newton import Fit
-from workbench.fitting.posterior import fitted_rig, posterior_deviation
+from workbench.fitting.posterior import (
+    Moved,
+    fitted_rig,
+    moved_parameters,
+    posterior_deviation,
+)
 from workbench.fitting.problem import Problem, pose
 from workbench.law_range import ranges_text
-from workbench.plant import TOGETHER, Candidate, Plant, require
+from workbench.plant import Plant, require
 from workbench.recording import Recording
 from workbench.rig import Rig
 from workbench.rig_laws import is_law
 
 NO_LAW = "no empirical law of up to three terms passes every criterion"
-
-
-@dataclass(frozen=True)
-class Moved:
-    """One parameter before and after: values, posterior and prior standard deviations in SI.
-
-    What was added has no prior: its ``prior_deviation`` is infinite.  What ended at a bound has no
-    ``deviation``, NaN.
-    """
-
-    name: str
-    before: float
-    after: float
-    deviation: float
-    prior_deviation: float
 
 
 @dataclass(frozen=True)
@@ -221,11 +212,13 @@ def _present(problem: Problem, candidate: Candidate) -> bool:
 def assembled(rig: Rig, steps: Sequence[Addition]) -> Rig:
     """The rig with its own priors, what the steps added free, and their notes.
 
-    What an earlier or later step moved beside its own effect stays as the rig has it.
+    What an earlier or later step moved beside its own effect stays as the rig has it; the halves of
+    a pair share their fit, and each brings its own effect.
     """
-    own = {name for step in steps for name in _names(step.candidate)}
+    own: set[str] = set()
     found = rig
     for step in steps:
+        own.update(_names(step.candidate))
         found = freed(found, step, own)
     kept = [line for step in steps for line in step.rig.notes[-1:]]
     return replace(found, notes=(*rig.notes, *kept))
@@ -289,21 +282,4 @@ def addition(
         fit=fit,
         validation_fit=unseen_fit,
         evidence=evidence,
-    )
-
-
-def moved_parameters(fit: Fit) -> tuple[Moved, ...]:
-    """What a fit moved, with standard deviations."""
-    values, unknowns = fit.plant.values, fit.unknowns
-    deviation = posterior_deviation(fit)
-    return tuple(
-        Moved(name, float(prior), values[name], float(d), float(s) if w >= 1.0 else float("inf"))
-        for name, prior, s, w, d in zip(
-            unknowns.names,
-            unknowns.prior,
-            unknowns.scale,
-            unknowns.precision,
-            deviation,
-            strict=True,
-        )
     )

@@ -18,14 +18,12 @@ from workbench.comparison.free_run import free_run_errors
 from workbench.consistency import checked
 from workbench.diagnosis.addition import (
     Addition,
-    Moved,
     accept,
     accept_law,
     add,
     add_law,
     apart,
     assembled,
-    moved_parameters,
 )
 from workbench.diagnosis.diagnose import Progress, diagnose, silent
 from workbench.diagnosis.improvement import Change, Improvement, Stage
@@ -33,7 +31,7 @@ from workbench.diagnosis.passes import Kept, Passes, Removal, Swap
 from workbench.diagnosis.result import Diagnosis, Law
 from workbench.fitting.errors import Errors, errors_of, per_sample
 from workbench.fitting.gauss_newton import Fit
-from workbench.fitting.posterior import fitted_rig
+from workbench.fitting.posterior import Moved, fitted_rig, moved_parameters
 from workbench.fitting.problem import NO_EVIDENCE, proves_nothing
 from workbench.recording import Recording
 from workbench.rig import Rig

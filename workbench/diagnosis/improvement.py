@@ -6,11 +6,12 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import NamedTuple
 
-from workbench.diagnosis.addition import Addition, Moved
+from workbench.diagnosis.addition import Addition
 from workbench.diagnosis.passes import Removal, Swap
 from workbench.diagnosis.result import Diagnosis, Law
 from workbench.fitting.errors import Errors
 from workbench.fitting.gauss_newton import Fit
+from workbench.fitting.posterior import Moved
 from workbench.rig import Rig
 
 

@@ -22,12 +22,12 @@ from math import isclose, isnan, log, sqrt
 
 import numpy as np
 
+from workbench.candidate import Candidate
 from workbench.diagnosis.refit import Refit
 from workbench.diagnosis.result import Ranked
 from workbench.diagnosis.scan import Profile
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.window_length import moves
-from workbench.plant import Candidate
 
 LEAST_BIC = 4.0
 LEAST_HELD_OUT = 0.02

@@ -15,6 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from workbench.candidate import Candidate
 from workbench.diagnosis.judge import reasons_against
 from workbench.diagnosis.refit import Refit, held_out_drop, refit
 from workbench.diagnosis.result import Law, LawTerm
@@ -22,7 +23,7 @@ from workbench.diagnosis.rough import rough_fit
 from workbench.diagnosis.scan import scan
 from workbench.fitting.problem import Problem, misfit
 from workbench.law_range import seen_in
-from workbench.plant import Candidate, Plant
+from workbench.plant import Plant
 from workbench.recording import Recording
 from workbench.rig_laws import is_law, law_terms, with_laws
 

@@ -23,10 +23,10 @@ from math import nan
 
 import numpy as np
 
+from workbench.candidate import together
 from workbench.diagnosis.scan import Metric, Profile, Trial, every_second
 from workbench.effect import Parameter
 from workbench.fitting.problem import Problem
-from workbench.plant import together
 
 FURTHEST = 3.0  # times a size of the scan: beyond it its change is not known
 LEAST_AMOUNT = 0.1  # of a size: a start at none would stay there

@@ -15,6 +15,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from math import inf, isnan
 
+from workbench.candidate import Candidate
 from workbench.diagnosis.judge import (
     CERTAIN_SHARE,
     CLEARLY_LESS,
@@ -34,7 +35,6 @@ from workbench.diagnosis.result import Ranked
 from workbench.diagnosis.rough import Rough, rough_fit
 from workbench.diagnosis.scan import Profile
 from workbench.fitting.problem import Problem
-from workbench.plant import Candidate
 
 MOST_PAIRS = 3  # that are fitted
 NOT_ALONE = "leaves hardly less than a single effect"

@@ -15,6 +15,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import nan
 
+from workbench.candidate import Candidate
 from workbench.diagnosis.addition import Addition, addition, assembled
 from workbench.diagnosis.diagnose import Progress
 from workbench.diagnosis.evidence import weighed
@@ -28,7 +29,6 @@ from workbench.effect import Kind
 from workbench.fitting.errors import errors_of
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.problem import Problem, improved_base, pose
-from workbench.plant import Candidate
 from workbench.recording import Recording
 from workbench.rig import Rig
 

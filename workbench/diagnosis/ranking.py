@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
+from workbench.candidate import Candidate
 from workbench.diagnosis.judge import HELD_OUT_REASON, LARGEST_TIE, reasons_against, tie_group
 from workbench.diagnosis.power import visible_from
 from workbench.diagnosis.refit import Refit
@@ -13,7 +14,6 @@ from workbench.diagnosis.scan import Profile
 from workbench.diagnosis.shifts import LEAVES_PRIOR, Shift
 from workbench.effect import Kind
 from workbench.fitting.problem import Problem
-from workbench.plant import Candidate
 from workbench.rig_laws import is_law
 
 

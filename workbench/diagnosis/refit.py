@@ -11,6 +11,7 @@ from math import nan
 
 import numpy as np
 
+from workbench.candidate import Candidate
 from workbench.diagnosis.result import Size
 from workbench.diagnosis.rough import Rough, windows_for
 from workbench.diagnosis.shifts import Shift
@@ -22,7 +23,6 @@ from workbench.fitting.posterior import posterior_deviation
 from workbench.fitting.problem import Problem, misfit
 from workbench.fitting.start_states import carried
 from workbench.fitting.unknowns import WIDE
-from workbench.plant import Candidate
 
 ITERATIONS = 10
 PROBES = (0.4, 0.6, 0.8, 0.9, 1.15, 1.4, 1.8, 2.5)  # factors on a fitted strength

@@ -8,10 +8,10 @@ from enum import Enum
 
 import numpy as np
 
+from workbench.candidate import Candidate
 from workbench.effect import Kind
 from workbench.fitting.errors import SignalError
 from workbench.fitting.gauss_newton import Fit
-from workbench.plant import Candidate
 from workbench.recording import Recording
 
 

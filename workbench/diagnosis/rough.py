@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from workbench.candidate import Candidate
 from workbench.diagnosis.blind_starts import blind_starts, settled
 from workbench.diagnosis.scan import Profile, Trial
 from workbench.fitting.gauss_newton import Fit, fit_windows, points_costs
@@ -24,7 +25,6 @@ from workbench.fitting.problem import Problem, staged
 from workbench.fitting.start_states import carried
 from workbench.fitting.unknowns import Unknowns
 from workbench.fitting.windows import Windows
-from workbench.plant import Candidate
 
 STARTS = 2  # sizes of the scan that are tried
 SHARES = (2.0, 1.0, 0.5, 0.0)  # of the linear step of the nuisances that goes with each

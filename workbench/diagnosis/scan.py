@@ -26,6 +26,7 @@ from itertools import product
 
 import numpy as np
 
+from workbench.candidate import Candidate
 from workbench.diagnosis.blind_starts import blind_starts, freed
 from workbench.effect import Parameter
 from workbench.fitting.linearised import Linearised, Normal, Point, linearise, normal_equations
@@ -33,7 +34,7 @@ from workbench.fitting.problem import staged, stateless
 from workbench.fitting.start_states import carried
 from workbench.fitting.unknowns import Unknowns
 from workbench.fitting.windows import Windows
-from workbench.plant import Candidate, Plant
+from workbench.plant import Plant
 
 FEWEST_WINDOWS = 24  # that a scan looks at; half of them where there are more
 LARGEST_STEP = 6.0  # prior deviations a nuisance may move in one linear step

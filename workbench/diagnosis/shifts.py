@@ -13,10 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from workbench.candidate import Candidate
 from workbench.diagnosis.result import Size
 from workbench.fitting.linearised import normal_equations
 from workbench.fitting.problem import Problem
-from workbench.plant import Candidate
 
 LEAVES_PRIOR = 3.0
 

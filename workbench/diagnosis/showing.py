@@ -17,6 +17,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from workbench.candidate import Candidate
 from workbench.diagnosis.judge import LEAST_SHARE, effective_samples
 from workbench.diagnosis.manoeuvre_choice import asked_for, chosen, inside, least_gain
 from workbench.diagnosis.result import NextRecording, Ranked
@@ -30,7 +31,6 @@ from workbench.fitting.start_states import carried
 from workbench.manoeuvres.library import LIBRARY
 from workbench.manoeuvres.limits import Limits, limits_of
 from workbench.manoeuvres.play import Manoeuvre
-from workbench.plant import Candidate
 
 NOTHING = "nothing"  # the rival that is the model as it is
 

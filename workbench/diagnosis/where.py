@@ -17,6 +17,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
+from workbench.candidate import Candidate
 from workbench.comparison.regimes import regime_shares
 from workbench.diagnosis.result import Dependence, Where
 from workbench.diagnosis.suspects import Suspect, suspects, wandering, with_missing_flows
@@ -24,7 +25,7 @@ from workbench.effect import Balance
 from workbench.filtering import FilterResult, log_likelihoods, recording_filter, smooth
 from workbench.fitting.problem import Problem
 from workbench.fitting.window_length import moves
-from workbench.plant import Candidate, Plant
+from workbench.plant import Plant
 from workbench.plant_filter import PlantFilter
 from workbench.recording import Recording
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,6 +12,21 @@ from workbench.fitting.linearised import Normal, normal_equations, rescaled
 from workbench.law_range import seen_in
 from workbench.rig import Rig
 from workbench.rig_laws import laws_of
+
+
+@dataclass(frozen=True)
+class Moved:
+    """One parameter before and after: values, posterior and prior standard deviations in SI.
+
+    What was added has no prior: its ``prior_deviation`` is infinite.  What ended at a bound has no
+    ``deviation``, NaN.
+    """
+
+    name: str
+    before: float
+    after: float
+    deviation: float
+    prior_deviation: float
 
 
 def posterior_deviation(fit: Fit) -> np.ndarray:
@@ -60,4 +75,21 @@ def fitted_rig(rig: Rig, fit: Fit, added: Sequence[str] = ()) -> Rig:
         rig.with_added(rig.plant.with_values(values), added),
         deviations={**rig.deviations, **{n: d for n, d in deviations.items() if d > 0}},
         seen=seen_in(rig.plant, fit.windows.recordings) if laws_of(rig.plant) else {},
+    )
+
+
+def moved_parameters(fit: Fit) -> tuple[Moved, ...]:
+    """What a fit moved, with standard deviations."""
+    values, unknowns = fit.plant.values, fit.unknowns
+    deviation = posterior_deviation(fit)
+    return tuple(
+        Moved(name, float(prior), values[name], float(d), float(s) if w >= 1.0 else float("inf"))
+        for name, prior, s, w, d in zip(
+            unknowns.names,
+            unknowns.prior,
+            unknowns.scale,
+            unknowns.precision,
+            deviation,
+            strict=True,
+        )
     )

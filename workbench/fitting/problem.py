@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
+from workbench.candidate import Candidate
 from workbench.effect import Effect
 from workbench.fitting.gauss_newton import Fit, fit_windows, points_costs
 from workbench.fitting.linearised import Linearised, Point
@@ -13,7 +14,7 @@ from workbench.fitting.start_states import refit_starts
 from workbench.fitting.unknowns import Unknowns, nominal_unknowns
 from workbench.fitting.window_length import window_length_s
 from workbench.fitting.windows import MOST_WINDOWS, cut_windows, one_clock
-from workbench.plant import Candidate, Plant
+from workbench.plant import Plant
 from workbench.recording import Recording, same_data
 from workbench.rig import Rig
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from workbench.plant import Candidate, Plant
+from workbench.candidate import Candidate
+from workbench.plant import Plant
 
 WIDE = 1e3  # prior deviations of an added cause, in typical sizes: bounds alone hold it
 
