@@ -70,9 +70,8 @@ class Rig:
     def standard_deviation(self, parameter: str) -> float:
         """One standard deviation of a parameter by its full name, 0 where its value is known."""
         own = self.deviations.get(parameter)
-        if own is not None:
-            return own
-        return self.plant.parameters[parameter].standard_deviation(self.plant.values[parameter])
+        value = self.plant.values[parameter]
+        return self.plant.parameters[parameter].standard_deviation(value) if own is None else own
 
     @property
     def ambient_pa(self) -> float:
