@@ -72,6 +72,6 @@ def answer(case: Case, train: Recording, validation: Recording, rig: Rig | None 
     name = bench_of(case).public_name(case)
     place = order.index(name) + 1 if name in order else 0
     leader = diagnosis.ranking[0]
-    printed = diagnosis.verdict is Verdict.TIE and name in leader.tied_with
+    printed = leader.accepted and name in leader.tied_with
     tied = place == 1 or printed
     return Answer(case, diagnosis, place, tied)
