@@ -164,6 +164,7 @@ def _ranked(row: Ranked) -> Document:
         "error_drop_train": plain(row.drop_train),
         "error_drop_validation": plain(row.drop_validation),
         "tied_with": list(row.tied_with),
+        "imitated_by": {name: plain(share) for name, share in row.imitated_by.items()},
         "compensable": plain(row.compensable),
         "visible_from": plain(row.visible_from),
         "decided_by": row.decided_by.value,

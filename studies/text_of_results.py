@@ -32,7 +32,7 @@ def diagnosis_text(found: Diagnosis, unit_of: Mapping[str, str]) -> str:
     """
     parts = [f"verdict: {found.verdict.value}: {found.sentence}"]
     parts += [f"warning: {warning}" for warning in found.warnings]
-    parts += ["", ranking_text(found)]
+    parts += ["", ranking_text(found), *(_imitated_text(found.named) if found.named else ())]
     if found.law:
         parts += ["", law_text(found.law)]
     if found.where:
@@ -43,6 +43,14 @@ def diagnosis_text(found: Diagnosis, unit_of: Mapping[str, str]) -> str:
     if found.next_recording:
         parts += ["", next_recording_text(found.next_recording)]
     return "\n".join(parts)
+
+
+def _imitated_text(leader: Ranked) -> list[str]:
+    """What each of a tie would explain of the first of it."""
+    return [
+        f"if {leader.candidate.name} is the truth, {name} would explain {percent(share)} of it"
+        for name, share in leader.imitated_by.items()
+    ]
 
 
 def next_recording_text(asked: NextRecording) -> str:

@@ -4,7 +4,6 @@ import csv
 import json
 import re
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,14 +12,13 @@ from studies.documents import comparison_document
 from studies.figures.comparison import comparison_figures
 from studies.figures.style import save
 from studies.text_of_comparison import comparison_text
-from workbench.comparison import compare, horizons
+from workbench.comparison import compare
 from workbench.comparison.compare import (
     FREE_RUN,
     ONE_STEP,
     PLAIN,
     WINDOW,
     Comparison,
-    signal_error,
 )
 from workbench.comparison.deviation import ShiftDeviation
 from workbench.comparison.horizons import lost
@@ -32,7 +30,6 @@ from workbench.rig import default_rig
 
 DT = 1e-3
 POSITION, PRESSURE = "slide.position_m", "chamber_a.pressure_pa"
-FOUND_NOTHING = SimpleNamespace(states=None)
 NOISE = {POSITION: 5e-6, PRESSURE: 400.0, "chamber_b.pressure_pa": 400.0}
 
 
@@ -108,15 +105,6 @@ def test_traces_have_the_length_of_the_recording(good):
     assert {len(row) for rows in good.simulated.values() for row in rows.values()} == {600}
 
 
-def test_the_fit_percent_is_that_of_system_identification():
-    y, yhat = np.array([1.0, 2.0, 3.0, 4.0]), np.array([1.0, 2.0, 3.0, 5.0])
-
-    found = signal_error(y, yhat, 0.1)
-
-    assert found.fit_percent == pytest.approx(100.0 * (1.0 - 1.0 / np.sqrt(5.0)))
-    assert found.rmse == pytest.approx(0.5)
-
-
 def test_the_squared_error_over_that_of_noise_stands_in_table_and_document(drive, bad):
     comparison = Comparison(drive.name, (bad,))
     (document,) = comparison_document(comparison)["recordings"]
@@ -126,19 +114,6 @@ def test_the_squared_error_over_that_of_noise_stands_in_table_and_document(drive
     assert document["errors"][FREE_RUN]["slide.position"]["chi2_per_sample"] == pytest.approx(heavy)
     (row,) = [line for line in said.splitlines() if re.match(r"slide\.position +free run", line)]
     assert row.split()[-1] == f"{heavy:.3g}"
-
-
-def test_what_only_noise_is_left_of_has_a_chi2_of_one():
-    noise = 0.1 * np.random.default_rng(5).standard_normal(4000)
-
-    assert signal_error(noise, np.zeros(4000), 0.1).chi2_per_sample == pytest.approx(1.0, abs=0.1)
-
-
-def test_missing_samples_count_for_nothing():
-    y = np.array([1.0, np.nan, 3.0])
-
-    assert signal_error(y, np.array([1.0, 9.0, 3.0]), 0.1).rmse == 0.0
-    assert np.isnan(signal_error(np.full(3, np.nan), y, 0.1).rmse)
 
 
 def test_the_valve_is_closed_inside_its_dead_zone(drive, recording):
@@ -187,22 +162,6 @@ def test_a_recording_shorter_than_a_window_says_so(drive, recording):
 
     assert WINDOW not in found.errors
     assert "window" in found.notes[0]
-
-
-def test_what_fails_in_the_windows_is_not_taken_for_a_short_recording(
-    drive, recording, monkeypatch
-):
-    def broken(*_):
-        raise ValueError("a bug")
-
-    monkeypatch.setattr(horizons, "_filtered", lambda *_: FOUND_NOTHING)
-    monkeypatch.setattr(horizons, "_one_step", lambda *_: {PRESSURE: np.zeros(len(recording))})
-    monkeypatch.setattr(horizons, "_free_run", lambda *_: dict.fromkeys(drive.plant.model.states))
-    monkeypatch.setattr(horizons, "_windows", broken)
-    course = SimpleNamespace(plant=drive.fit_for(recording), recording=recording)
-
-    with pytest.raises(ValueError, match="a bug"):
-        horizons.foretold(course, NOISE)
 
 
 def test_a_plant_without_states_is_compared_sample_by_sample():

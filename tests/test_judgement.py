@@ -10,7 +10,13 @@ from studies.text_of_results import moved_text
 from workbench.comparison.regimes import regimes
 from workbench.diagnosis.diagnose import _followed, diagnose, silent
 from workbench.diagnosis.improve import add, improve
-from workbench.diagnosis.judge import SHARE_REASON, reasons_against, tie_group
+from workbench.diagnosis.judge import (
+    SHARE_REASON,
+    alignment,
+    imitation,
+    reasons_against,
+    tie_group,
+)
 from workbench.diagnosis.ranking import ranked
 from workbench.diagnosis.result import DecidedBy, Size, Verdict
 from workbench.diagnosis.shifts import shifts
@@ -89,6 +95,13 @@ def test_four_that_cannot_be_told_apart_are_no_tie_but_a_recording_too_weak(
     assert rows[0].crowd[0] in sentence(Verdict.RECORDING_TOO_WEAK, rows, None)
     three = ranked(problem, followed.profiles, [sound, *alike[:2]], [], {})
     assert judged(three, None, True, ()) is Verdict.TIE
+    by_name = {profile.candidate.name: profile for profile in followed.profiles}
+    own = by_name[sound.candidate.name]
+    assert set(three[0].imitated_by) == set(three[0].tied_with)
+    for name, share in three[0].imitated_by.items():
+        assert share == pytest.approx(max(alignment(own, by_name[name]), 0.0) ** 2)
+    assert imitation(own, own) == pytest.approx(1.0)
+    assert imitation(own, replace(own, signature=-own.signature)) == 0.0
 
 
 def test_an_accepted_row_leads_one_that_fails_a_criterion(problem, followed, sound):

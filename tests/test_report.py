@@ -131,6 +131,16 @@ def test_a_tie_says_what_to_record_next():
     assert "next recording: hold and wait" in diagnosis_text(found, {})
 
 
+def test_a_tie_says_what_the_others_would_explain_of_the_first():
+    tied = diagnosis(Verdict.TIE, tied=("spool_leak",))
+    first = replace(tied.ranking[0], imitated_by={"spool_leak": 0.924})
+    found = replace(tied, ranking=(first, *tied.ranking[1:]))
+
+    said = "if chamber_leak@chamber_a is the truth, spool_leak would explain 92 % of it"
+    assert said in diagnosis_text(found, UNITS).splitlines()
+    assert diagnosis_document(found, UNITS)["ranking"][0]["imitated_by"] == {"spool_leak": 0.924}
+
+
 def test_nothing_missing_names_no_effect():
     document = diagnosis_document(diagnosis(Verdict.NOTHING_MISSING), UNITS)
 

@@ -179,3 +179,13 @@ def alignment(one: Profile, other: Profile) -> float:
     a, b = one.signature, other.signature
     size = float(np.linalg.norm(a) * np.linalg.norm(b))
     return float(a @ b) / size if size > 0 else 0.0
+
+
+def imitation(truth: Profile, other: Profile) -> float:
+    """Share of the fall of the misfit by a truth that another would bring in its place.
+
+    q = C^2, with C the cosine of their signatures; nothing where they point apart.
+
+    Source: diagnosis.md 1.7.
+    """
+    return max(alignment(truth, other), 0.0) ** 2

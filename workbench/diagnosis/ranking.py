@@ -6,7 +6,13 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from workbench.candidate import Candidate
-from workbench.diagnosis.judge import HELD_OUT_REASON, LARGEST_TIE, reasons_against, tie_group
+from workbench.diagnosis.judge import (
+    HELD_OUT_REASON,
+    LARGEST_TIE,
+    imitation,
+    reasons_against,
+    tie_group,
+)
 from workbench.diagnosis.power import visible_from
 from workbench.diagnosis.refit import Refit
 from workbench.diagnosis.result import DecidedBy, Ranked
@@ -38,6 +44,9 @@ def ranked(
         r.candidate.name: refitted_row(problem, r, tied, by_name.get(r.candidate.name))
         for r in refits
     }
+    for name in (each for each in names if each in by_name):
+        shares = {n: imitation(by_name[name], by_name[n]) for n in tied[name] if n in by_name}
+        rows[name] = replace(rows[name], imitated_by=shares)
     if crowd:
         rows[names[0]] = replace(rows[names[0]], crowd=crowd)
     order = [*together, *(name for name in rows if name not in together)]

@@ -73,6 +73,9 @@ class Ranked:
         where the candidate was not refitted.
     tied_with
         Public names of the candidates that cannot be told apart from it here.
+    imitated_by
+        Of those that it is tied with: the share of its effect on this recording that each would
+        explain, were it the truth.
     compensable
         Share of its effect on this recording that the fitted parameters can imitate.
     accepted, reasons
@@ -97,6 +100,7 @@ class Ranked:
     reasons: tuple[str, ...]
     visible_from: float = float("nan")
     crowd: tuple[str, ...] = ()
+    imitated_by: Mapping[str, float] = field(default_factory=dict)
     fit: Fit | None = field(default=None, repr=False)
     validation: Fit | None = field(default=None, repr=False)
 

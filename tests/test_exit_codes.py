@@ -1,0 +1,57 @@
+"""What goes wrong, as a message and an exit code."""
+
+import pytest
+
+from controllers.design_file import design
+from studies.command_line.application import answering
+from workbench.errors import UnknownNameError
+from workbench.rig import default_rig
+
+
+@pytest.mark.parametrize(
+    ("error", "code"),
+    [
+        (ArithmeticError("diverged"), 3),
+        (ValueError("no"), 2),
+        (UnknownNameError("no such effect"), 2),
+        (KeyError("a bug's key"), 3),
+        (KeyboardInterrupt(), 130),
+        (StopIteration(), 3),
+        (IndexError("list index out of range"), 3),
+        (TypeError("argument of type 'int'\nis not iterable"), 3),
+    ],
+)
+def test_what_goes_wrong_becomes_an_exit_code(error, code):
+    import typer
+
+    with pytest.raises(typer.Exit) as stopped, answering(quiet=True):
+        raise error
+
+    assert stopped.value.exit_code == code
+
+
+def test_an_unknown_name_reads_as_its_message_and_is_a_key_error(capsys):
+    import typer
+
+    with pytest.raises(KeyError) as refused:
+        design("lqq", default_rig("servo_drive").plant)
+    with pytest.raises(typer.Exit), answering(quiet=True):
+        raise refused.value
+
+    said = "no controller lqq; there is pid, lq, mpc; did you mean 'lq'?"
+    assert capsys.readouterr().err == f"workbench: {said}\n"
+
+
+def test_what_nobody_foresaw_is_one_line_and_its_trace_is_shown_when_asked(monkeypatch, capsys):
+    import typer
+
+    with pytest.raises(typer.Exit), answering():
+        raise TypeError("argument of type 'int'\nis not iterable")
+    assert capsys.readouterr().err.splitlines() == [
+        "workbench: inside the program: TypeError argument of type 'int'; "
+        "WORKBENCH_DEBUG=1 shows where"
+    ]
+
+    monkeypatch.setenv("WORKBENCH_DEBUG", "1")
+    with pytest.raises(TypeError), answering():
+        raise TypeError("argument")
