@@ -73,8 +73,8 @@ def _balance(diagnosis: Diagnosis) -> str:
 def pair_row(task: Task, said: Improvement) -> Row:
     """What was added one after the other, against the two that were hidden."""
     bench = bench_of(task.cases[0])
-    rounds = zip(said.steps, said.diagnoses, strict=False)
-    tied = {step.candidate.name: found.ranking[0].tied_with for step, found in rounds}
+    leaders = [each.ranking[0] for each in said.diagnoses if each.ranking]
+    tied = {c.name: row.tied_with for row in leaders for c in row.candidate.singles}
     hidden = [str(bench.public_name(case)) for case in task.cases]
     accepted, wrong = counted(said.kept, tied, hidden, bench)
     return Row(

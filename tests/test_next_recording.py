@@ -10,10 +10,7 @@ from test_diagnosis import bench, coulomb
 from studies.demo import DATA
 from studies.documents import diagnosis_document
 from studies.export import save_next_recording
-from studies.hidden_effects import recordings
-from studies.next_recording import separate, separation_text
 from studies.text_of_results import next_recording_text
-from studies.truth.cases import read_cases
 from workbench.comparison.run import read_inputs
 from workbench.diagnosis.diagnose import diagnose
 from workbench.diagnosis.manoeuvre_choice import least_gain
@@ -292,14 +289,3 @@ def test_a_bench_that_cannot_be_commanded_gets_advice_in_words():
     document = diagnosis_document(found, {})["next_recording"]
     assert document["expected_gain"] is None
     assert document["separates"] == list(asked.separates)
-
-
-@pytest.mark.slow
-def test_the_recommended_recording_breaks_the_tie_on_the_independent_truth():
-    case = read_cases()["constant_force", 3]
-    (pair,) = recordings([case])
-
-    found = separate(case, *pair)
-
-    assert found.before.ranking[0].tied_with, "the case is no tie to begin with"
-    assert found.broken, separation_text(found)

@@ -1,10 +1,10 @@
 """Two effects that only work together: tried where single effects fail.
 
-Where no single candidate passes, or the one that does leaves most of the misfit, the pairs that
-gain most beyond their better half (:mod:`workbench.diagnosis.pair_gains`) are fitted from several
-sizes of both and judged as single ones are.  A pair pays for the parameters of both and must take
-twice the least share; each half must pass the criteria on top of the other alone, as the backward
-pass will ask again; and what is left must be clearly less than what the best single one leaves.
+Where no single candidate passes, the pairs that gain most beyond their better half
+(:mod:`workbench.diagnosis.pair_gains`) are fitted from several sizes of both and judged as single
+ones are.  A pair pays for the parameters of both and must take twice the least share; each half
+must pass the criteria on top of the other alone, as the backward pass will ask again; and what is
+left must be clearly less than what the best single one leaves.
 
 Source: diagnosis.md 1.5, 1.6 and 1.10.
 """
@@ -17,7 +17,6 @@ from math import inf, isnan
 
 from workbench.candidate import Candidate
 from workbench.diagnosis.judge import (
-    CERTAIN_SHARE,
     CLEARLY_LESS,
     CLOSE_DROP,
     LEAST_SHARE,
@@ -84,7 +83,7 @@ def _first_fit(problem: Problem, profile: Profile) -> Rough:
 def _wanted(problem: Problem, ranking: tuple[Ranked, ...]) -> bool:
     """True where single effects fail, and there is misfit that two parameters could earn."""
     leader = ranking[0] if ranking else None
-    settled = leader and leader.accepted and leader.drop_train >= CERTAIN_SHARE
+    settled = leader is not None and leader.accepted
     return not settled and needed(problem, 2) < problem.misfit
 
 
