@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from workbench.closed_loop import LoopRecord
 
 LINES = ("-", "--", "-.", ":")
+A_STEP = 20.0  # an error beyond so many times the range of interest is the step itself
 
 
 def draw_position(axes: Axes, records: dict[str, LoopRecord]) -> None:
@@ -27,12 +28,15 @@ def draw_position(axes: Axes, records: dict[str, LoopRecord]) -> None:
 
 
 def draw_error(axes: Axes, records: dict[str, LoopRecord], largest_m: float = 1e-3) -> None:
-    """Each run's error, near zero."""
+    """Each run's error; near zero, up to ``largest_m``, where a step of the reference dwarfs it."""
+    most_m = 0.0
     for style, (name, record) in zip(_styles(records), records.items(), strict=True):
         recording = record.recording
         error = recording[POSITION] - recording[f"reference.{POSITION}"]
         axes.plot(recording.time_s, 1e3 * error, **style, label=name)
-    axes.set_ylim(-1e3 * largest_m, 1e3 * largest_m)
+        most_m = max(most_m, float(abs(error).max()))
+    if most_m > A_STEP * largest_m:
+        axes.set_ylim(-1e3 * largest_m, 1e3 * largest_m)
     axes.set_ylabel("error (mm)")
 
 
