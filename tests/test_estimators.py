@@ -10,16 +10,8 @@ from scipy.linalg import expm
 
 from estimators import ESTIMATORS
 from studies.closed_loop_check import standard_estimator
-from workbench.filtering import (
-    consistent_start,
-    correct,
-    filter_pass,
-    log_likelihoods,
-    predict,
-    recording_filter,
-    smooth,
-    smoothed,
-)
+from workbench.filter_passes import filter_pass, log_likelihoods, recording_filter, smooth
+from workbench.filtering import consistent_start, correct, predict, smoothed
 from workbench.plant_filter import transition
 from workbench.plants.servo_drive import COMMAND, OUTPUTS, servo_drive
 from workbench.recording import Recording

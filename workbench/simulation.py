@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from workbench.called import result
 from workbench.plant import Plant
 from workbench.recording import Recording
 
@@ -86,7 +87,7 @@ def _run(
     rows = [np.reshape(x0, (-1, 1))]
     for part in _parts(n - 1):
         several = plant.model.run(dt, part.stop - part.start)
-        rows.append(several(rows[-1][:, -1], u[:, part], d[:, part], p).full())
+        rows.append(result(several, rows[-1][:, -1], u[:, part], d[:, part], p))
     return np.hstack(rows)
 
 
@@ -96,7 +97,12 @@ def _outputs(
     """Outputs at every sample, shape (n_y, n)."""
     h, n = plant.model.h, max(u.shape[1], d.shape[1])
     several = ((h.map(s.stop - s.start), s) for s in _parts(n))
-    return np.hstack([give(x[:, s], u[:, s], d[:, s], p).full() for give, s in several])
+    return np.hstack(
+        [
+            result(give, x[:, s], u[:, s], d[:, s], np.tile(p[:, None], s.stop - s.start))
+            for give, s in several
+        ]
+    )
 
 
 def _parts(n: int) -> list[slice]:

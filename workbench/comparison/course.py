@@ -9,6 +9,7 @@ from math import ceil
 import casadi as ca
 import numpy as np
 
+from workbench.called import result
 from workbench.comparison.noise import recorded_noise
 from workbench.fitting.starts import SMOOTHING_SAMPLES, bridged, guessed_states, slope
 from workbench.plant import Plant
@@ -46,8 +47,10 @@ class Course:
         give = ca.Function("along", [*model.symbols], [ca.vertcat(*expressions)])
         parts = (slice(k, k + AT_ONCE) for k in range(0, len(self.recording), AT_ONCE))
         columns = [(self.states[:, s], u[:, s], d[:, s]) for s in parts]
-        p = self.plant.nominal[2]
-        return np.hstack([give.map(x.shape[1])(x, w, v, p).full() for x, w, v in columns])
+        p = self.plant.nominal[2][:, None]
+        return np.hstack(
+            [result(give.map(x.shape[1]), x, w, v, np.tile(p, x.shape[1])) for x, w, v in columns]
+        )
 
     @cached_property
     def places(self) -> tuple[Place, ...]:

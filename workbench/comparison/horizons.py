@@ -16,7 +16,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from workbench.comparison.course import Course
-from workbench.filtering import FilterResult, filter_pass, recording_filter
+from workbench.filter_passes import FilterResult, filter_pass, recording_filter
 from workbench.fitting.start_states import refit_starts
 from workbench.fitting.window_length import window_length_s
 from workbench.fitting.windows import TooShortError, Windows, cut_windows

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from workbench.called import result
 from workbench.fitting.error_model import ACTIVE
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.noise import NoNoiseError, measured_noise
@@ -97,7 +98,7 @@ def _simulated(plant: Plant, readings: Sequence[Recording], where: Probe) -> np.
     x0 = np.where(absurd, plant.initial[:, None], x0)
     p = np.tile(plant.nominal[2][:, None], count)
     run = window_run(plant, dt, length).map(count)
-    sent = run(x0, u, d, p).full().reshape(len(plant.measured), count, length)
+    sent = result(run, x0, u, d, p).reshape(len(plant.measured), count, length)
     sent[:, absurd] = np.nan
     return received_windows(plant, sent, (firsts,) * len(readings), dt)
 

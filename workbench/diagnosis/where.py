@@ -22,7 +22,7 @@ from workbench.comparison.regimes import regime_shares
 from workbench.diagnosis.result import Dependence, Where
 from workbench.diagnosis.suspects import Suspect, suspects, wandering, with_missing_flows
 from workbench.effect import Balance
-from workbench.filtering import FilterResult, log_likelihoods, recording_filter, smooth
+from workbench.filter_passes import FilterResult, log_likelihoods, recording_filter, smooth
 from workbench.fitting.problem import Problem
 from workbench.fitting.window_length import moves
 from workbench.plant import Plant

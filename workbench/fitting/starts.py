@@ -18,12 +18,14 @@ Source: physics.md 1.2 level 1, solved for the mass flow.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from itertools import pairwise
 
 import casadi as ca
 import numpy as np
 
 from workbench.air import HEAT_CAPACITY_RATIO
+from workbench.called import result
 from workbench.gas_volume import GasVolume
 from workbench.plant import Plant
 from workbench.recording import Recording
@@ -34,15 +36,19 @@ OBSERVED_MASS_SHARE = 0.01  # standard deviation of a gas mass that was followed
 RESUMED_MASS_SHARE = 0.05  # the same where it was lost from sight: 15 K, in full motion
 
 
-def guessed_states(plant: Plant, recording: Recording) -> np.ndarray:
-    """States at every sample and their standard deviations from the recording, (2, n_x, n)."""
+def guessed_states(plant: Plant, recording: Recording, known: Collection[str] = ()) -> np.ndarray:
+    """States at every sample and their standard deviations from the recording, (2, n_x, n).
+
+    Gas is not followed where its mass is ``known`` already.
+    """
     blind = long_holes(plant, recording)
     states = sensed_states(plant, recording, blind)
     if not states.size:
         return states
     weighed = [p for p in plant.parts if isinstance(p, GasVolume) and p.level.counts_mass]
     for part in weighed:
-        if f"{part.name}.pressure_pa" in recording.channels:
+        wanted = f"{part.name}.mass_kg" not in known
+        if wanted and f"{part.name}.pressure_pa" in recording.channels:
             _follow_gas(plant, part, recording, states, blind)
     return states
 
@@ -161,12 +167,13 @@ def _folded(
     """The followed mass after every sample, shape (n,), in chunks: long graphs build slowly."""
     n = columns[0].shape[1]
     chunk = flow.mapaccum(CHUNK)
+    held = np.tile(p[:, None], CHUNK), np.full((1, CHUNK), dt)
     found = np.zeros(0)
     for first in range(0, n, CHUNK):
         part = [c[:, first : first + CHUNK] for c in columns]
         short = CHUNK - part[0].shape[1]
         part = [np.pad(c, ((0, 0), (0, short)), mode="edge") for c in part]
-        found = np.append(found, chunk(mass, *part, p, dt).full().ravel())
+        found = np.append(found, result(chunk, [[mass]], *part, *held).ravel())
         mass = found[-1]
     return found[:n]
 

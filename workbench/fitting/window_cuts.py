@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import casadi as ca
 import numpy as np
 
@@ -128,13 +130,15 @@ def window_starts(
     recordings: tuple[Recording, ...],
     firsts: tuple[tuple[int, ...], ...],
     noise: np.ndarray,
+    known: Collection[str] = (),
 ) -> tuple[np.ndarray, np.ndarray]:
     """Start states and their standard deviations, shapes (n_x, n_windows).
 
     The guess of a state that is recorded is no better than the noise ``noise``, shape (n_y,).
+    States that are ``known`` already are guessed roughly: the caller has better.
     """
     columns = [
-        guessed_states(plant, recording)[:, :, list(own)]
+        guessed_states(plant, recording, known)[:, :, list(own)]
         for recording, own in zip(recordings, firsts, strict=True)
     ]
     guess, deviation = np.concatenate(columns, axis=2)

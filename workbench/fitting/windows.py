@@ -17,6 +17,7 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
+from workbench.called import result
 from workbench.effect import Effect
 from workbench.fitting.error_model import OUTLYING, ErrorModel, error_model
 from workbench.fitting.window_cuts import (
@@ -156,11 +157,14 @@ class Windows:
 
     def with_plant(self, plant: Plant) -> Windows:
         """The same windows for a plant with other effects; states it shares keep their start."""
-        start, deviation = window_starts(plant, self.recordings, self.firsts, self.noise)
         ours, theirs = list(plant.state_list), list(self.plant.state_list)
+        start, deviation = window_starts(
+            plant, self.recordings, self.firsts, self.noise, known=theirs
+        )
         for row, name in enumerate(ours):
             if name in theirs:
                 start[row] = self.start[theirs.index(name)]
+                deviation[row] = self.start_deviation[theirs.index(name)]
         return replace(self, plant=plant, start=start, start_deviation=deviation)
 
     def simulated(self, plants: Iterable[Plant], starts: np.ndarray) -> np.ndarray:
@@ -177,7 +181,7 @@ class Windows:
         u, d = (np.hstack([each[k] for each in fed]) for k in (0, 1))
         p = np.hstack([np.tile(plant.nominal[2][:, None], len(self)) for plant in plants])
         x0 = np.hstack(list(starts)) if starts.shape[1] else np.zeros((0, p.shape[1]))
-        y = self._run.map(p.shape[1], "thread", THREADS)(x0, u, d, p).full()
+        y = result(self._runs(p.shape[1]), x0, u, d, p)
         n_y, n = len(self.plant.measured), len(self)
         sent = y.reshape(n_y, len(plants), n, self.length).transpose(1, 0, 2, 3)
         dt = self.recordings[0].sample_time_s
@@ -194,6 +198,16 @@ class Windows:
         return np.nan_to_num(
             weighted, nan=UNSEEN_PENALTY, posinf=UNSEEN_PENALTY, neginf=-UNSEEN_PENALTY
         )
+
+    def _runs(self, count: int) -> ca.Function:
+        """So many windows side by side; built once."""
+        if count not in self._built:
+            self._built[count] = self._run.map(count, "thread", THREADS)
+        return self._built[count]
+
+    @cached_property
+    def _built(self) -> dict[int, ca.Function]:
+        return {}
 
     @cached_property
     def _run(self) -> ca.Function:

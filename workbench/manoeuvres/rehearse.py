@@ -15,11 +15,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import casadi as ca
 import numpy as np
 
+from workbench.called import called, result
 from workbench.effects.timing import sent_at_s
 from workbench.fitting.gauss_newton import Fit
+from workbench.fitting.windows import THREADS
 from workbench.manoeuvres.limits import Axis, Limits
 from workbench.manoeuvres.play import Play
 from workbench.model import BLOCK
@@ -128,8 +129,8 @@ class _Batch:
         plant = fit.windows.plant  # its model serves all values
         self.model, self.channels = plant.model, _held_inputs(fit)
         block = self.model.compiled_block(limits.sample_time_s)
-        self.block, self.h = block.map(n), self.model.h.map(n)
-        self.p = ca.repmat(ca.DM(self.plant.nominal[2]), 1, n)
+        self.block, self.h = block.map(n, "thread", THREADS), self.model.h.map(n)
+        self.p = np.tile(self.plant.nominal[2][:, None], n)
         self.d = np.array([*self.channels.values()]).reshape(-1, 1)
         self.x = np.tile(self.plant.initial[:, None], (1, n))
         time_s = limits.time_s
@@ -141,7 +142,7 @@ class _Batch:
     def outputs(self) -> np.ndarray:
         """Outputs now, shape (n_y, n_plays), under the commands that hold."""
         u = self.inputs[-1][:, :, -1].T if self.inputs else self._resting()
-        return self.h(self.x, u, np.tile(self.d, (1, self.n)), self.p).full()
+        return result(self.h, self.x, u, np.tile(self.d, (1, self.n)), self.p)
 
     def advance(self, commands: np.ndarray, span: slice) -> None:
         """Run one block on under commands (n_plays, n_u, n), known up to its end."""
@@ -150,7 +151,7 @@ class _Batch:
         full = np.pad(u, ((0, 0), (0, 0), (0, BLOCK - size)), mode="edge")
         columns = full.transpose(1, 0, 2).reshape(u.shape[1], self.n * BLOCK)
         d = np.tile(self.d, (1, self.n * BLOCK))
-        last, later = (v.full() for v in self.block(self.x, columns, d, self.p))
+        last, later = called(self.block, self.x, columns, d, self.p)
         later = later.reshape(len(self.x), self.n, BLOCK).transpose(1, 0, 2)
         here = np.concatenate([self.x.T[:, :, None], later[:, :, :-1]], axis=2)
         self.states.append(here[:, :, :size])
@@ -161,10 +162,10 @@ class _Batch:
         """Outputs of each play as the computer gets them, shape (n_y, n)."""
         x, u = (np.concatenate(parts, axis=2) for parts in (self.states, self.inputs))
         n = x.shape[2]
-        h, d, p = self.model.h.map(n), np.tile(self.d, (1, n)), self.p[:, 0]
+        h, d, p = self.model.h.map(n), np.tile(self.d, (1, n)), np.tile(self.p[:, :1], n)
         dt = self.limits.sample_time_s
         return [
-            received(self.plant, h(own, sent, d, p).full(), dt)
+            received(self.plant, result(h, own, sent, d, p), dt)
             for own, sent in zip(x, u, strict=True)
         ]
 

@@ -1,0 +1,71 @@
+"""Calls of CasADi functions on arrays, without a Python number for every value.
+
+A call in CasADi's own way turns each array into a matrix of its own and each result into a list of
+Python numbers on its way to NumPy.  For the outputs of a few hundred windows that takes as long as
+their simulation.  Here the function reads and writes the arrays themselves.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+
+
+def called(function: ca.Function, *arguments: object) -> tuple[np.ndarray, ...]:
+    """All results of a function as dense arrays, each of the shape of its output.
+
+    A one-dimensional argument is a column; each must have the shape of its input.
+
+    Raises
+    ------
+    ValueError
+        If an argument has another shape than its input, or their number differs.
+    RuntimeError
+        If the function fails.
+    """
+    if len(arguments) != function.n_in():
+        raise ValueError(f"{function.name()} takes {function.n_in()}, not {len(arguments)} inputs")
+    buffer, evaluate = function.buffer()
+    given = [_column_major(function, k, value) for k, value in enumerate(arguments)]
+    results = [np.zeros(function.nnz_out(k)) for k in range(function.n_out())]
+    for k, values in enumerate(given):
+        buffer.set_arg(k, memoryview(values))
+    for k, values in enumerate(results):
+        buffer.set_res(k, memoryview(values))
+    evaluate()
+    if buffer.ret():
+        raise RuntimeError(f"{function.name()} failed")
+    return tuple(_dense(function.sparsity_out(k), values) for k, values in enumerate(results))
+
+
+def result(function: ca.Function, *arguments: object) -> np.ndarray:
+    """The first result of :func:`called`."""
+    return called(function, *arguments)[0]
+
+
+def _column_major(function: ca.Function, place: int, value: object) -> np.ndarray:
+    """Values that the function reads for one input, column by column."""
+    pattern = function.sparsity_in(place)
+    given = np.asarray(value, dtype=float)
+    given = given[:, None] if given.ndim == 1 else np.atleast_2d(given)
+    if given.shape != pattern.shape:
+        raise ValueError(
+            f"{function.name()}: input {function.name_in(place)} has shape {pattern.shape}, "
+            f"given is {given.shape}"
+        )
+    if pattern.is_dense():
+        return np.ascontiguousarray(given.T).ravel()
+    return np.ascontiguousarray(given[np.array(pattern.row(), dtype=int), _columns(pattern)])
+
+
+def _dense(pattern: ca.Sparsity, values: np.ndarray) -> np.ndarray:
+    if pattern.is_dense():
+        return values.reshape(pattern.shape, order="F")
+    found = np.zeros(pattern.shape)
+    found[np.array(pattern.row(), dtype=int), _columns(pattern)] = values
+    return found
+
+
+def _columns(pattern: ca.Sparsity) -> np.ndarray:
+    """Column of every stored value."""
+    return np.array(pattern.get_col(), dtype=int)
