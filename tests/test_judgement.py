@@ -12,15 +12,11 @@ from workbench.diagnosis.diagnose import _followed, diagnose, silent
 from workbench.diagnosis.improve import add, improve
 from workbench.diagnosis.judge import (
     SHARE_REASON,
-    alignment,
-    imitation,
     reasons_against,
-    tie_group,
 )
 from workbench.diagnosis.ranking import ranked
 from workbench.diagnosis.result import DecidedBy, Size, Verdict
 from workbench.diagnosis.shifts import shifts
-from workbench.diagnosis.verdict import judged, sentence
 from workbench.fitting.error_model import error_model
 from workbench.fitting.fit import fit
 from workbench.fitting.posterior import moved_parameters
@@ -73,35 +69,6 @@ def test_the_share_that_counts_is_the_share_that_is_printed(problem, sound):
 
 def test_a_size_of_one_deviation_is_not_accepted(problem, sound):
     assert reasons_against(problem.base, unsure(sound)) == ("its size is not distinct from none",)
-
-
-def test_those_that_pass_come_before_a_tie_is_cut_to_three(problem, followed, sound):
-    doubtful = [replace(unsure(named(sound, followed, k)), drop_train=0.99) for k in range(3)]
-    group = tie_group(problem.base, [*doubtful, replace(sound, drop_train=0.95)], {})
-
-    assert len(group) == 3
-    assert group[0].candidate == sound.candidate
-
-
-def test_four_that_cannot_be_told_apart_are_no_tie_but_a_recording_too_weak(
-    problem, followed, sound
-):
-    alike = [named(sound, followed, k) for k in range(3)]
-    rows = ranked(problem, followed.profiles, [sound, *alike], [], {})
-
-    assert len(rows[0].tied_with) == 2
-    assert len(rows[0].crowd) == 1
-    assert judged(rows, None, True, ()) is Verdict.RECORDING_TOO_WEAK
-    assert rows[0].crowd[0] in sentence(Verdict.RECORDING_TOO_WEAK, rows, None)
-    three = ranked(problem, followed.profiles, [sound, *alike[:2]], [], {})
-    assert judged(three, None, True, ()) is Verdict.TIE
-    by_name = {profile.candidate.name: profile for profile in followed.profiles}
-    own = by_name[sound.candidate.name]
-    assert set(three[0].imitated_by) == set(three[0].tied_with)
-    for name, share in three[0].imitated_by.items():
-        assert share == pytest.approx(max(alignment(own, by_name[name]), 0.0) ** 2)
-    assert imitation(own, own) == pytest.approx(1.0)
-    assert imitation(own, replace(own, signature=-own.signature)) == 0.0
 
 
 def test_an_accepted_row_leads_one_that_fails_a_criterion(problem, followed, sound):

@@ -142,7 +142,8 @@ def tie_group(base: Fit, refits: list[Refit], profiles: dict[str, Profile]) -> l
     a signature in the same direction: then only the nuisances decide between the two.  Among the
     tied those that pass every criterion come first, effects before parameters that would lie far
     off what is known of them, and among these the held-out recording decides where it does so
-    clearly: the one that leaves at least a fifth less of the misfit there leads.
+    clearly: the one that leaves at least a fifth less of the misfit there leads.  Those that look
+    most like the leader stand next to it: were it wrong, it would stand for one of them.
     """
     best = refits[0]
     tied = [best]
@@ -160,7 +161,9 @@ def tie_group(base: Fit, refits: list[Refit], profiles: dict[str, Profile]) -> l
     best, leader = effects[0], min(effects, key=left_held_out)
     if not left_held_out(leader) < (1.0 - CLEARLY_LESS) * left_held_out(best):
         leader = best
-    return [leader, *(each for each in tied if each is not leader)]
+    others = [each for each in tied if each is not leader]
+    others.sort(key=lambda r: (r not in sound, -abs(_alignment_of(leader, r, profiles))))
+    return [leader, *others]
 
 
 def left_held_out(each: Refit | Ranked) -> float:

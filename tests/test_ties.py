@@ -1,0 +1,78 @@
+"""Which candidates are one, as far as a recording can tell, and in which order they stand."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_judgement import BARE, HELD_OUT, TRAIN, named, unsure
+
+from workbench.diagnosis.diagnose import _followed, silent
+from workbench.diagnosis.judge import alignment, imitation, tie_group
+from workbench.diagnosis.ranking import ranked
+from workbench.diagnosis.result import Verdict
+from workbench.diagnosis.verdict import judged, sentence
+from workbench.fitting.problem import pose
+from workbench.rig import load_rig
+
+
+@pytest.fixture(scope="module")
+def problem():
+    return pose(load_rig(BARE), [TRAIN], [HELD_OUT])
+
+
+@pytest.fixture(scope="module")
+def followed(problem):
+    return _followed(problem, None, silent)
+
+
+@pytest.fixture(scope="module")
+def sound(followed):
+    (found,) = [r for r in followed.refits if r.candidate.name == "coulomb_friction"]
+    return found
+
+
+def test_those_that_pass_come_before_a_tie_is_cut_to_three(problem, followed, sound):
+    doubtful = [replace(unsure(named(sound, followed, k)), drop_train=0.99) for k in range(3)]
+    group = tie_group(problem.base, [*doubtful, replace(sound, drop_train=0.95)], {})
+
+    assert len(group) == 3
+    assert group[0].candidate == sound.candidate
+
+
+def test_those_that_look_like_the_leader_stand_next_to_it(problem, followed, sound):
+    """A sensor that is wrong by a share looks like one that is wrong by a constant."""
+    own = next(p for p in followed.profiles if p.candidate == sound.candidate)
+    away = np.random.default_rng(3).normal(size=own.signature.shape)
+    away *= np.linalg.norm(own.signature) / np.linalg.norm(away)
+    rivals = [replace(named(sound, followed, k), drop_train=sound.drop_train) for k in range(3)]
+    profiles = {sound.candidate.name: own} | {
+        rival.candidate.name: replace(
+            own, candidate=rival.candidate, signature=own.signature + share * away
+        )
+        for rival, share in zip(rivals, (2.0, 0.5, 0.1), strict=True)
+    }
+    group = tie_group(problem.base, [sound, *rivals], profiles)
+
+    names = [each.candidate.name for each in (sound, *reversed(rivals))]
+    assert [each.candidate.name for each in group] == names
+
+
+def test_four_that_cannot_be_told_apart_are_no_tie_but_a_recording_too_weak(
+    problem, followed, sound
+):
+    alike = [named(sound, followed, k) for k in range(3)]
+    rows = ranked(problem, followed.profiles, [sound, *alike], [], {})
+
+    assert len(rows[0].tied_with) == 2
+    assert len(rows[0].crowd) == 1
+    assert judged(rows, None, True, ()) is Verdict.RECORDING_TOO_WEAK
+    assert rows[0].crowd[0] in sentence(Verdict.RECORDING_TOO_WEAK, rows, None)
+    three = ranked(problem, followed.profiles, [sound, *alike[:2]], [], {})
+    assert judged(three, None, True, ()) is Verdict.TIE
+    by_name = {profile.candidate.name: profile for profile in followed.profiles}
+    own = by_name[sound.candidate.name]
+    assert set(three[0].imitated_by) == set(three[0].tied_with)
+    for name, share in three[0].imitated_by.items():
+        assert share == pytest.approx(max(alignment(own, by_name[name]), 0.0) ** 2)
+    assert imitation(own, own) == pytest.approx(1.0)
+    assert imitation(own, replace(own, signature=-own.signature)) == 0.0
