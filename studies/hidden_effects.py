@@ -44,6 +44,13 @@ class Answer:
         return self.case.hidden in bench_of(self.case).truth.hidden
 
     @property
+    def names_a_difference(self) -> bool:
+        """Whether it names one of the small differences that every truth of the plant has."""
+        if self.diagnosis.verdict not in (Verdict.FOUND, Verdict.TIE):
+            return False
+        return self.named.partition("@")[0] in bench_of(self.case).always_there
+
+    @property
     def right(self) -> bool:
         """Whether the answer passes: see the module."""
         verdict = self.diagnosis.verdict
@@ -51,7 +58,7 @@ class Answer:
             if verdict is Verdict.NOT_IN_CATALOGUE:
                 return False
             names = verdict in (Verdict.FOUND, Verdict.TIE)
-            return not names or self.named.partition("@")[0] in bench_of(self.case).always_there
+            return not names or self.names_a_difference
         if not self.in_catalogue:
             return verdict is Verdict.NOT_IN_CATALOGUE
         return self.tied
