@@ -229,6 +229,8 @@ class Diagnosis:
     ``base`` is the prior fit without any addition, ``base_validation`` the same on held-out data.
     ``evidence`` says what that data is worth.
     ``next_recording`` is there where the verdict leaves a question open.
+    ``contradicted`` is True where recording and rig contradict each other: whatever the ranking
+    accepts then is no effect to be added.
     """
 
     rig_name: str
@@ -244,6 +246,7 @@ class Diagnosis:
     base_validation: Fit | None = field(repr=False)
     next_recording: NextRecording | None = None
     evidence: Evidence = Evidence.VALIDATION
+    contradicted: bool = False
 
     @property
     def named(self) -> Ranked | None:
