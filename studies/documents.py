@@ -163,6 +163,8 @@ def _ranked(row: Ranked) -> Document:
         },
         "error_drop_train": plain(row.drop_train),
         "error_drop_validation": plain(row.drop_validation),
+        "error_drop_wide_priors": plain(row.drop_wide),
+        "modification_index": plain(row.modification_index),
         "tied_with": list(row.tied_with),
         "imitated_by": {name: plain(share) for name, share in row.imitated_by.items()},
         "compensable": plain(row.compensable),

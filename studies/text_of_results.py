@@ -63,13 +63,18 @@ def next_recording_text(asked: NextRecording) -> str:
 
 
 def ranking_text(found: Diagnosis) -> str:
-    """The best of the ranking as a table; compensable is what the fitted parameters can imitate."""
+    """The best of the ranking as a table.
+
+    The index is the modification index, in chi2; compensable is what the fitted parameters can
+    imitate.
+    """
     rows = [
         (
             str(place),
             row.candidate.name,
             percent(row.drop_train, 1),
             percent(row.drop_validation, 1),
+            number(row.modification_index, 3),
             percent(row.compensable),
             sizes_text(row),
             row.decided_by.value,
@@ -77,7 +82,7 @@ def ranking_text(found: Diagnosis) -> str:
         )
         for place, row in enumerate(found.ranking[:SHOWN_RANKS], start=1)
     ]
-    head = ("", "effect", "drop train", "validation", "compensable", "size", "by", "")
+    head = ("", "effect", "drop train", "validation", "mod. index", "compensable", "size", "by", "")
     rest = len(found.ranking) - SHOWN_RANKS
     more = f"\n... and {rest} more, in the JSON" if rest > 0 else ""
     return columns(head, rows) + more
