@@ -29,11 +29,11 @@ def modification_index(profile: Profile, strength: Parameter) -> float:
 
 def _promised(trial: Trial, strength: Parameter) -> float:
     """The same of one trial, in whose own multiples a is counted: c(0) - c(1) is its drop."""
-    if trial.shown <= 0.0:
+    slope = trial.drop + trial.shown
+    if slope <= 0.0 or trial.shown <= 0.0:
         return 0.0
     null = strength.null or 0.0
     away = trial.values[trial.candidate.strength] - null
     end = strength.upper if away > 0.0 else strength.lower
-    slope = trial.drop + trial.shown
-    amount = min(max(slope / (2.0 * trial.shown), 0.0), (end - null) / away)
+    amount = min(slope / (2.0 * trial.shown), (end - null) / away)
     return amount * slope - amount**2 * trial.shown
