@@ -132,6 +132,7 @@ def signal(error: SignalError, name: str) -> Document:
         "noise": plain(error.noise),
         "chi2_per_sample": plain(error.chi2_per_sample),
         "left_out": error.left_out,
+        "left_out_from": vars(error.left_out_from) if error.left_out_from else None,
     }
 
 

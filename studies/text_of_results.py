@@ -163,12 +163,18 @@ def before_after_text(before: Errors, after: Errors, unit_of: Mapping[str, str])
 def _left_out(sets: Errors, when: str = "") -> list[str]:
     """What the errors do not count, in words."""
     return [
-        f"{label}{when}: {name} could not be simulated for {error.left_out} samples, "
-        "which its RMSE leaves out"
+        f"{label}{when}: {name} could not be simulated for {error.left_out} samples"
+        f"{_since(error)}, which its RMSE leaves out"
         for label, row in sets.items()
         for name, error in row.items()
         if error.left_out
     ]
+
+
+def _since(error: SignalError) -> str:
+    """Where the first of the samples lies that an error leaves out, where that is known."""
+    place = error.left_out_from
+    return f", the first at {place.time_s:.4g} s of {place.recording}" if place else ""
 
 
 def errors_text(sets: Errors, unit_of: Mapping[str, str]) -> str:
