@@ -132,6 +132,7 @@ def signal(error: SignalError, name: str) -> Document:
         "noise": plain(error.noise),
         "chi2_per_sample": plain(error.chi2_per_sample),
         "left_out": error.left_out,
+        "left_out_from": vars(error.left_out_from) if error.left_out_from else None,
     }
 
 
@@ -163,6 +164,8 @@ def _ranked(row: Ranked) -> Document:
         },
         "error_drop_train": plain(row.drop_train),
         "error_drop_validation": plain(row.drop_validation),
+        "error_drop_wide_priors": plain(row.drop_wide),
+        "modification_index": plain(row.modification_index),
         "tied_with": list(row.tied_with),
         "imitated_by": {name: plain(share) for name, share in row.imitated_by.items()},
         "compensable": plain(row.compensable),

@@ -63,13 +63,18 @@ def next_recording_text(asked: NextRecording) -> str:
 
 
 def ranking_text(found: Diagnosis) -> str:
-    """The best of the ranking as a table; compensable is what the fitted parameters can imitate."""
+    """The best of the ranking as a table.
+
+    The index is the modification index, in chi2; compensable is what the fitted parameters can
+    imitate.
+    """
     rows = [
         (
             str(place),
             row.candidate.name,
             percent(row.drop_train, 1),
             percent(row.drop_validation, 1),
+            number(row.modification_index, 3),
             percent(row.compensable),
             sizes_text(row),
             row.decided_by.value,
@@ -77,7 +82,7 @@ def ranking_text(found: Diagnosis) -> str:
         )
         for place, row in enumerate(found.ranking[:SHOWN_RANKS], start=1)
     ]
-    head = ("", "effect", "drop train", "validation", "compensable", "size", "by", "")
+    head = ("", "effect", "drop train", "validation", "mod. index", "compensable", "size", "by", "")
     rest = len(found.ranking) - SHOWN_RANKS
     more = f"\n... and {rest} more, in the JSON" if rest > 0 else ""
     return columns(head, rows) + more
@@ -158,12 +163,18 @@ def before_after_text(before: Errors, after: Errors, unit_of: Mapping[str, str])
 def _left_out(sets: Errors, when: str = "") -> list[str]:
     """What the errors do not count, in words."""
     return [
-        f"{label}{when}: {name} could not be simulated for {error.left_out} samples, "
-        "which its RMSE leaves out"
+        f"{label}{when}: {name} could not be simulated for {error.left_out} samples"
+        f"{_since(error)}, which its RMSE leaves out"
         for label, row in sets.items()
         for name, error in row.items()
         if error.left_out
     ]
+
+
+def _since(error: SignalError) -> str:
+    """Where the first of the samples lies that an error leaves out, where that is known."""
+    place = error.left_out_from
+    return f", the first at {place.time_s:.4g} s of {place.recording}" if place else ""
 
 
 def errors_text(sets: Errors, unit_of: Mapping[str, str]) -> str:

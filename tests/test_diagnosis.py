@@ -1,12 +1,14 @@
 """Diagnosis on a friction bench whose truth is written here in plain numpy."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from studies.text_of_results import addition_text
 from workbench.diagnosis.diagnose import diagnose
 from workbench.diagnosis.improve import accept, add, improve
-from workbench.diagnosis.judge import alignment
+from workbench.diagnosis.judge import SHARE_REASON, alignment
 from workbench.diagnosis.result import DecidedBy, Verdict
 from workbench.diagnosis.scan import scan
 from workbench.fitting.fit import fit
@@ -85,11 +87,33 @@ def test_what_was_not_followed_says_so(found):
         assert row.accepted or row.reasons
 
 
-def test_where_nothing_is_missing_nothing_is_named(rig):
-    found = diagnose(rig, [bench(1, nothing)], [bench(2, nothing)])
+@pytest.mark.parametrize("seed", [1, 3, 5])
+def test_where_nothing_is_missing_nothing_is_named(rig, seed):
+    """No small proxy either: model and truth differ in nothing that one could stand for."""
+    found = diagnose(rig, [bench(seed, nothing)], [bench(seed + 1, nothing)])
 
-    assert found.verdict in (Verdict.NOTHING_MISSING, Verdict.SMALL_PROXY)
-    assert found.best is None
+    assert found.verdict is Verdict.NOTHING_MISSING
+    assert found.named is None
+    assert not any(row.accepted for row in found.ranking)
+
+
+def test_what_explains_a_little_and_may_stand_for_something_else_is_a_small_proxy(rig):
+    """A force of 12 N that wanders is in no catalogue; 5 N of friction are 15 % of the misfit."""
+
+    def wandering(seed, gauge_pa):
+        random = np.random.default_rng(seed + 50).standard_normal(2200)
+        slow = np.convolve(random, np.ones(60) / np.sqrt(60), "same")[:2000]
+        plain = bench(seed, lambda v: 5.0 * np.sign(v), gauge_pa=gauge_pa)
+        force = plain["rod.force_n"] + 12.0 * slow
+        return replace(plain, channels={**plain.channels, "rod.force_n": force})
+
+    found = diagnose(rig, [wandering(1, 3e5)], [wandering(2, 4e5)])
+    leader = found.ranking[0]
+
+    assert found.verdict is Verdict.SMALL_PROXY
+    assert found.named is leader and found.best is None
+    assert leader.reasons == (SHARE_REASON,) and 0.1 < leader.drop_train < 0.2
+    assert found.sentence.endswith("may stand for something else")
 
 
 def test_without_validation_the_verdict_is_at_most_a_tie_with_a_warning(rig):

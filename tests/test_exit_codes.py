@@ -1,10 +1,12 @@
 """What goes wrong, as a message and an exit code."""
 
+import numpy as np
 import pytest
 
 from controllers.design_file import design
 from studies.command_line.application import answering
 from workbench.errors import UnknownNameError
+from workbench.recording import Recording
 from workbench.rig import default_rig
 
 
@@ -39,6 +41,17 @@ def test_an_unknown_name_reads_as_its_message_and_is_a_key_error(capsys):
         raise refused.value
 
     said = "no controller lqq; there is pid, lq, mpc; did you mean 'lq'?"
+    assert capsys.readouterr().err == f"workbench: {said}\n"
+
+
+def test_a_channel_that_a_recording_lacks_is_wrong_input_with_the_nearest(capsys):
+    import typer
+
+    with pytest.raises(typer.Exit) as stopped, answering(quiet=True):
+        Recording("run 7", 1e-3, {"slide.position_m": np.zeros(3)})["slide.positon_m"]
+
+    assert stopped.value.exit_code == 2
+    said = "run 7 has no slide.positon_m; it has slide.position_m; did you mean 'slide.position_m'?"
     assert capsys.readouterr().err == f"workbench: {said}\n"
 
 

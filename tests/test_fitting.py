@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from studies.text_of_results import errors_text
-from workbench.fitting.errors import plain_ratio, signal_errors
+from workbench.fitting.errors import Place, plain_ratio, signal_errors
 from workbench.fitting.gauss_newton import best_of_each, fit_windows, points_costs
 from workbench.fitting.linearised import Point
 from workbench.fitting.noise import measured_noise
@@ -88,7 +88,7 @@ def test_samples_that_could_not_be_simulated_are_counted_and_left_out_of_the_err
     windows = cut_windows(bench, [Recording("still", 1e-2, channels)], {"rod.force_n": 0.2})
     fit = refit_starts(windows)
     worse = fit.residual.copy()
-    worse[:, :3] = UNSEEN_PENALTY
+    worse[:, 4:7] = UNSEEN_PENALTY
     rows = worse.transpose(1, 0, 2).reshape(len(windows), -1)
     short = replace(fit, derivatives=replace(fit.derivatives, residual=rows))
 
@@ -96,10 +96,11 @@ def test_samples_that_could_not_be_simulated_are_counted_and_left_out_of_the_err
     (none,) = signal_errors(refit_starts(windows, {"chamber.area_m2": 1e305})).values()
 
     assert (whole.left_out, part.left_out) == (0, 3 * windows.length)
+    assert whole.left_out_from is None and part.left_out_from == Place("still", pytest.approx(0.8))
     assert part.rmse == pytest.approx(whole.rmse, rel=0.05)
     assert plain_ratio(fit, short) > 1.0
     assert np.isnan(none.rmse) and none.left_out == windows.count == n
-    assert "rod.force could not be simulated for 60 samples" in errors_text(
+    assert "for 60 samples, the first at 0.8 s of still, which" in errors_text(
         {"train": {"rod.force": part}}, {"rod.force": "rod.force_n"}
     )
 

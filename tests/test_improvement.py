@@ -128,6 +128,24 @@ def test_free_runs_that_are_interrupted_leave_all_else(rig, sets, monkeypatch):
     assert found.free_before == found.free_after == {}
 
 
+def test_nothing_is_added_where_recording_and_rig_contradict_each_other(sets):
+    """The force of another cylinder at a steady pressure: a constant force takes the mean away."""
+    time_s = sets[0][0].time_s
+    strange = [
+        replace(each, channels={**each.channels, "rod.force_n": 400 + 2 * np.sin(2.5 * time_s + k)})
+        for k, each in enumerate((*sets[0], *sets[1]))
+    ]
+    rig = load_rig(f'{BARE}[fixed]\nnames = ["chamber.area"]\n')
+    heard = []
+    found = improve(rig, strange[:2], strange[2:], heard.append)
+    (only,) = found.diagnoses
+
+    assert only.ranking[0].accepted and only.contradicted
+    assert found.steps == found.kept == () and found.rig is rig
+    assert any("contradict each other" in message for message in heard)
+    assert "contradict each other" in improvement_text(found, UNITS)
+
+
 def test_the_written_rig_gives_the_printed_errors_again(improved, sets, tmp_path):
     write_rig(improved.rig, tmp_path / "rig2.toml")
     again = load_rig(tmp_path / "rig2.toml")

@@ -78,11 +78,11 @@ def test_a_leak_is_choked_above_the_critical_pressure():
     found = regimes(plant, recording)
 
     choked, subsonic = (
-        found[f"chamber_leak out of chamber {state}"] for state in ("choked", "subsonic")
+        found[f"chamber leak out of chamber {state}"] for state in ("choked", "subsonic")
     )
     assert pressure_pa[choked].min() == pytest.approx(AMBIENT_PA / NOZZLE_RATIO, rel=5e-3)
     assert pressure_pa[subsonic].max() == pytest.approx(AMBIENT_PA / NOZZLE_RATIO, rel=5e-3)
-    assert not any(name.startswith("chamber_leak into") for name in found)
+    assert not any(name.startswith("chamber leak into") for name in found)
 
 
 def test_a_path_of_the_iso_law_is_choked_below_its_own_critical_ratio():
@@ -125,8 +125,8 @@ def test_several_joints_are_told_apart_by_name():
 
     found = regimes(plant, Recording("leg", DT, channels))
 
-    assert found["joint_2 moving forward"].all() and found["joint_1 at rest"].all()
-    assert "joint_1 moving forward" not in found
+    assert found["joint 2 moving forward"].all() and found["joint 1 at rest"].all()
+    assert "joint 1 moving forward" not in found
 
 
 @pytest.fixture(scope="module")

@@ -51,6 +51,8 @@ def ranked(candidate, drop, accepted=False, tied=(), decided_by=DecidedBy.REFIT)
         decided_by=decided_by,
         accepted=accepted,
         reasons=() if accepted else ("explains too little",),
+        drop_wide=0.5,
+        modification_index=1234.0,
     )
 
 
@@ -101,6 +103,7 @@ def test_a_diagnosis_has_the_keys_of_the_contract():
     assert first["error_drop_train"] == 0.93
     assert first["error_drop_validation"] == pytest.approx(0.91)
     assert (first["tied_with"], first["compensable"]) == ([], 0.12)
+    assert (first["error_drop_wide_priors"], first["modification_index"]) == (0.5, 1234.0)
     assert (first["decided_by"], first["kind"]) == ("refit", "effect")
     where = document["where"]
     assert where["balance"] == "chamber_a.mass"
@@ -190,6 +193,7 @@ def test_a_diagnosis_reads_in_the_units_of_people():
     assert "0.08123 bar" in said and "0.009 bar" in said
     assert "valve closed 74 %" in said
     (head,) = [line for line in said.splitlines() if "drop train" in line]
+    assert "index" in head and said.count(" 1.23e+03 ") == 2
     assert "compensable" in head and said.count(" 12 % ") == 2
 
 

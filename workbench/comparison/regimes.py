@@ -34,13 +34,13 @@ def regimes(plant: Plant, recording: Recording) -> dict[str, np.ndarray]:
 
 
 def regimes_of(course: Course) -> dict[str, np.ndarray]:
-    """The same for a course that is known already."""
+    """The same for a course that is known already; names are words: ``valve into chamber b``."""
     found = _valve_sides(course) | _flows(course) | phases(course)
     several = len(course.places) > 1
     for place in course.places:
         own = motion(course, place)
         found |= {f"{place.member} {name}": each for name, each in own.items()} if several else own
-    return {name: samples for name, samples in found.items() if samples.any()}
+    return {name.replace("_", " "): each for name, each in found.items() if each.any()}
 
 
 def shares(chosen: Mapping[str, np.ndarray], squared: np.ndarray) -> dict[str, float]:

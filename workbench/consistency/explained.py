@@ -26,6 +26,7 @@ from workbench.fitting.noise import NoNoiseError, measured_noise
 from workbench.fitting.starts import long_holes, sensed_states
 from workbench.fitting.window_cuts import cut_rows, received_windows, window_firsts, window_run
 from workbench.fitting.window_length import window_length_s
+from workbench.fitting.windows import Windows
 from workbench.plant import Plant
 from workbench.recording import Recording
 from workbench.simulation import inputs
@@ -107,16 +108,30 @@ def left_unexplained(fit: Fit) -> dict[str, float]:
     """The same for the windows of a fit, by full name of the outputs that move."""
     windows = fit.windows
     error = fit.residual * windows.scale[:, :, None]
-    moves = np.sqrt(np.mean(windows.activity**2, axis=1)) > ACTIVE * windows.noise
-    found = _ratio(error, windows.measured, not windows.plant.state_list)
+    stateless = not windows.plant.state_list
+    moves = _motion(windows, stateless) > ACTIVE * windows.noise
+    found = _ratio(error, windows.measured, stateless)
     return {n: float(x) for n, x, m in zip(windows.plant.measured, found, moves, strict=True) if m}
+
+
+def _motion(windows: Windows, stateless: bool) -> np.ndarray:
+    """Standard deviation of each output beyond noise, about the same means as the ratio, (n_y,)."""
+    if not stateless:
+        return np.sqrt(np.mean(windows.activity**2, axis=1))
+    seen = np.maximum(np.isfinite(windows.measured).sum(axis=(1, 2)), 1)
+    variance = _spread(windows.measured, stateless) / seen
+    return np.sqrt(np.maximum(variance - windows.noise**2, 0.0))
+
+
+def _spread(measured: np.ndarray, stateless: bool) -> np.ndarray:
+    """Sum of squares about the mean, of each window or of all, (n_y,)."""
+    about = np.nanmean(measured, axis=(1, 2) if stateless else 2, keepdims=True)
+    return np.nansum((measured - about) ** 2, axis=(1, 2))
 
 
 def _ratio(error: np.ndarray, measured: np.ndarray, stateless: bool) -> np.ndarray:
     """Root of squared errors over squares about the mean, (n_y,); arrays (n_y, n_windows, L)."""
-    seen = np.isfinite(measured)
-    about = np.nanmean(measured, axis=(1, 2) if stateless else 2, keepdims=True)
-    spread = np.sum(np.where(seen, measured - about, 0.0) ** 2, axis=(1, 2))
+    seen, spread = np.isfinite(measured), _spread(measured, stateless)
     lost = (seen & ~np.isfinite(error)).any(axis=(1, 2))
     with np.errstate(over="ignore", invalid="ignore"):
         squares = np.sum(np.where(seen, error, 0.0) ** 2, axis=(1, 2))

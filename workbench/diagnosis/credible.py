@@ -37,6 +37,7 @@ def credible(found: Diagnosis, doubts: Sequence[Finding]) -> Diagnosis:
             law=None,
             warnings=(*found.warnings, warning),
             next_recording=None,
+            contradicted=True,
         )
     if found.verdict is Verdict.FOUND and any(each.weight is Weight.DOUBT for each in doubts):
         sentence = f"{found.sentence}, if the recording can be trusted"

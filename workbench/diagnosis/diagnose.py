@@ -33,7 +33,7 @@ from workbench.diagnosis.result import NAMING, Diagnosis, Law, Ranked, Where
 from workbench.diagnosis.rough import rough_fit
 from workbench.diagnosis.scan import Profile, scan
 from workbench.diagnosis.shifts import Shift, shifts
-from workbench.diagnosis.verdict import far_above_noise, judged, sentence, unexplained
+from workbench.diagnosis.verdict import far_above_noise, judged, sentence, unexplained, unsteady
 from workbench.diagnosis.where import acts_in, locate
 from workbench.effect import Kind
 from workbench.fitting.errors import errors_of
@@ -108,7 +108,7 @@ def diagnose(
     if best and best.fit and not best.fit.converged:
         warnings += (f"the refit with {best.candidate.name} did not converge: its size may be off",)
     after = (law.fit, law.validation) if law else (best and best.fit, best and best.validation)
-    warnings += unexplained(far, verdict)
+    warnings += unexplained(far, verdict) + unsteady(ranking, profiles, verdict)
     return credible(
         Diagnosis(
             rig_name=rig.name,

@@ -71,9 +71,10 @@ def improve(
     """Diagnose and add until nothing in the catalogue earns its place, then think again.
 
     The effect added is the first of the ranking where it passes every criterion, also where an
-    empirical law would do better: a physical effect comes first.  With ``law`` an empirical law is
-    taken in the end, where one passes the same criteria.  An interrupt after the first finished
-    round ends the work there, with what is finished.
+    empirical law would do better: a physical effect comes first.  Where recording and rig
+    contradict each other nothing more is added, and what was added before stays.  With ``law`` an
+    empirical law is taken in the end, where one passes the same criteria.  An interrupt after the
+    first finished round ends the work there, with what is finished.
 
     Raises
     ------
@@ -115,6 +116,9 @@ def _forward(
             base = (diagnosis.base, diagnosis.base_validation)
             done = done.marked(Change.START.value, *base, Change.START)
         done = replace(done, diagnoses=(*done.diagnoses, diagnosis))
+        if diagnosis.contradicted:
+            progress(f"stopped in round {count}: {diagnosis.sentence}")
+            break
         best = diagnosis.ranking[0] if diagnosis.ranking else None
         if best is None or best.fit is None or not best.accepted:
             break
@@ -135,7 +139,8 @@ def _thought_over(
     progress: Progress,
 ) -> _Rounds:
     """Backward pass, then swap pass; an interrupt keeps what is finished."""
-    rounds = [each for each in done.diagnoses if each.ranking and each.ranking[0].accepted]
+    rounds = [each for each in done.diagnoses if not each.contradicted and each.ranking]
+    rounds = [each for each in rounds if each.ranking[0].accepted]
     accepted = {c.name: each for each in rounds for c in each.ranking[0].candidate.singles}
     passes = Passes(done.rig, train, validation, accepted, progress)
     try:

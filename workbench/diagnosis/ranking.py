@@ -17,6 +17,7 @@ from workbench.diagnosis.power import visible_from
 from workbench.diagnosis.refit import Refit
 from workbench.diagnosis.result import DecidedBy, Ranked
 from workbench.diagnosis.scan import Profile
+from workbench.diagnosis.score import modification_index
 from workbench.diagnosis.shifts import LEAVES_PRIOR, Shift
 from workbench.effect import Kind
 from workbench.fitting.problem import Problem
@@ -108,7 +109,7 @@ def refitted_row(
     """The row of a refit; a single effect has the profile of its scan, a parameter has none."""
     against = reasons_against(problem.base, each)
     pair = len(each.candidate.singles) > 1
-    return Ranked(
+    row = Ranked(
         candidate=each.candidate,
         kind=Kind.EFFECT if profile or pair else Kind.PARAMETER,
         size=each.size,
@@ -119,10 +120,10 @@ def refitted_row(
         decided_by=DecidedBy.REFIT,
         accepted=not against,
         reasons=against,
-        visible_from=visible_from(problem, profile) if profile else float("nan"),
         fit=each.fit,
         validation=each.validation,
     )
+    return _with_scan(problem, row, profile) if profile else row
 
 
 def _shifted(shift: Shift) -> Ranked:
@@ -149,7 +150,7 @@ def _scanned_row(problem: Problem, profile: Profile, begun: Mapping[str, float])
         reason = f"left behind after a first fit, which removed {max(begun[name], 0.0):.0%}"
     elif profile.drop <= 0.0:
         reason = "brings nothing"
-    return Ranked(
+    row = Ranked(
         candidate=profile.candidate,
         kind=Kind.EFFECT,
         size={},
@@ -160,5 +161,16 @@ def _scanned_row(problem: Problem, profile: Profile, begun: Mapping[str, float])
         decided_by=DecidedBy.SCAN,
         accepted=False,
         reasons=(reason,),
+    )
+    return _with_scan(problem, row, profile)
+
+
+def _with_scan(problem: Problem, row: Ranked, profile: Profile) -> Ranked:
+    """The row with what the scan alone tells of its candidate."""
+    strength = problem.whole.parameters[profile.candidate.strength]
+    return replace(
+        row,
         visible_from=visible_from(problem, profile),
+        drop_wide=profile.drop_wide / problem.misfit,
+        modification_index=modification_index(profile, strength),
     )

@@ -80,6 +80,11 @@ class Ranked:
         Share of its effect on this recording that the fitted parameters can imitate.
     accepted, reasons
         Whether it passes every criterion of diagnosis.md 1.6, and why not in words.
+    drop_wide
+        Share of the misfit that the scan would see go with priors three times as wide; NaN where
+        the scan did not ask.
+    modification_index
+        Fall of chi2 that the smallest size of the scan promises; NaN likewise.
     visible_from
         Size in typical sizes from which this recording would show it; NaN where that is not known.
     crowd
@@ -101,6 +106,8 @@ class Ranked:
     visible_from: float = float("nan")
     crowd: tuple[str, ...] = ()
     imitated_by: Mapping[str, float] = field(default_factory=dict)
+    drop_wide: float = float("nan")
+    modification_index: float = float("nan")
     fit: Fit | None = field(default=None, repr=False)
     validation: Fit | None = field(default=None, repr=False)
 
@@ -229,6 +236,8 @@ class Diagnosis:
     ``base`` is the prior fit without any addition, ``base_validation`` the same on held-out data.
     ``evidence`` says what that data is worth.
     ``next_recording`` is there where the verdict leaves a question open.
+    ``contradicted`` is True where recording and rig contradict each other: whatever the ranking
+    accepts then is no effect to be added.
     """
 
     rig_name: str
@@ -244,6 +253,7 @@ class Diagnosis:
     base_validation: Fit | None = field(repr=False)
     next_recording: NextRecording | None = None
     evidence: Evidence = Evidence.VALIDATION
+    contradicted: bool = False
 
     @property
     def named(self) -> Ranked | None:

@@ -38,6 +38,7 @@ from workbench.plant import Plant
 
 FEWEST_WINDOWS = 24  # that a scan looks at; half of them where there are more
 LARGEST_STEP = 6.0  # prior deviations a nuisance may move in one linear step
+WIDER = 3.0  # times as wide: the priors of the second look (diagnosis.md 2: 5 % and 15 %)
 
 
 @dataclass(frozen=True)
@@ -66,6 +67,7 @@ class Profile:
     signature       what it does to the residual that nothing else can, (rows,)
     compensation    share of its effect that the fitted parameters can imitate, R^2
     changes         what each trial does to the projected residual, (n_trials, rows)
+    drop_wide       the drop with priors ``WIDER`` times as wide; NaN where it was not asked for
     """
 
     candidate: Candidate
@@ -73,6 +75,7 @@ class Profile:
     signature: np.ndarray
     compensation: float
     changes: np.ndarray = field(repr=False)
+    drop_wide: float = float("nan")
 
     @property
     def drop(self) -> float:
@@ -91,6 +94,18 @@ class Metric:
     def cost(self) -> float:
         """c(0): the projected cost of the model as it is."""
         return self._value(self.normal.residual, self.normal.gradient)
+
+    def loosened(self, ratio: float) -> Metric:
+        """The same with priors of the parameters ``ratio`` times as wide: Lambda / ratio^2."""
+        normal = self.normal
+        less = (1.0 - ratio**-2) * normal.precision
+        looser = replace(
+            normal,
+            hessian=normal.hessian - np.diag(less),
+            gradient=normal.gradient - less * self.at.point.t,
+            precision=normal.precision - less,
+        )
+        return replace(self, normal=looser)
 
     def rows(self, residuals: np.ndarray) -> np.ndarray:
         """Residuals (n, n_y, n_windows, L) as projected rows, shape (n, n_windows, rows)."""
@@ -245,6 +260,7 @@ def _profiles(
 ) -> list[Profile]:
     found: dict[str, list[tuple[Trial, np.ndarray]]] = {}
     before, as_it_is = metric.cost, metric.normal.residual
+    wide = metric.loosened(WIDER)
     for (candidate, change), size, row in zip(trials, sizes, rows, strict=True):
         cost, step = metric.explained(row)
         shown = of_all * metric.shown(row - as_it_is)
@@ -257,7 +273,10 @@ def _profiles(
         signature, share = metric.signature(as_it_is - row)
         changes = np.array([(row - as_it_is).ravel() for _, row in pairs], dtype=np.float32)
         trials = tuple(trial for trial, _ in pairs)
-        profiles.append(Profile(best.candidate, trials, signature, share, changes))
+        drop_wide = of_all * max(wide.cost - wide.explained(row)[0] for _, row in pairs)
+        profiles.append(
+            Profile(best.candidate, trials, signature, share, changes, max(drop_wide, 0.0))
+        )
     return profiles
 
 

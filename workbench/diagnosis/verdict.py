@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from workbench.diagnosis.judge import SHARE_REASON
 from workbench.diagnosis.power import too_weak
 from workbench.diagnosis.result import NAMING, Evidence, Law, Ranked, Verdict
+from workbench.diagnosis.scan import WIDER, Profile
 from workbench.fitting.errors import errors_of
 from workbench.fitting.gauss_newton import Fit
 
@@ -51,6 +52,25 @@ def far_above_noise(held_out: Fit | None) -> list[str]:
     ]
     lost = [f"{n} not simulated for {e.left_out} samples" for n, e in errors if e.left_out]
     return [*missed, *lost]
+
+
+def unsteady(
+    ranking: tuple[Ranked, ...], profiles: Sequence[Profile], verdict: Verdict
+) -> tuple[str, ...]:
+    """A warning where the width of the priors decides which effect the scan puts first.
+
+    What the leader is tied with already is no news.  A parameter that leads would only lead more.
+
+    Source: diagnosis.md 2 (ranking at two prior widths).
+    """
+    leader = ranking[0] if verdict in NAMING else None
+    if leader is None or not any(p.candidate == leader.candidate for p in profiles):
+        return ()
+    first = max(profiles, key=lambda each: each.drop_wide).candidate
+    known = (leader.candidate.name, *leader.tied_with, *leader.crowd)
+    if first == profiles[0].candidate or first.name in known:
+        return ()
+    return (f"with priors {WIDER:g} times as wide {first.name} would lead the scan",)
 
 
 def unexplained(far: Sequence[str], verdict: Verdict) -> tuple[str, ...]:

@@ -7,14 +7,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from workbench.air import (
-    GAS_CONSTANT_J_KG_K,
-    FlowLaw,
-    IsoLaw,
-    NozzleLaw,
-    Path,
-    path_between,
-)
+from workbench.air import GAS_CONSTANT_J_KG_K, IsoLaw
 from workbench.effect import (
     Balance,
     Cause,
@@ -26,6 +19,13 @@ from workbench.effect import (
     form,
     strength,
 )
+from workbench.effects.spool_causes import (
+    DISCHARGE_ASYMMETRY,
+    EXHAUST_RESTRICTION,
+    SPOOL_LEAK,
+    SUPPLY_RESTRICTION,
+)
+from workbench.port import port, spool_flow_kg_s
 from workbench.spool import area_share
 
 
@@ -53,22 +53,8 @@ class FivePortValve(Effect):
     """
 
     causes = (
-        Cause(
-            name="exhaust_restriction",
-            strength="exhaust_restriction_share",
-            balance=Balance.FLOW,
-            drivers=("command", "exhausting chamber pressure"),
-            shown_by="exhaust from full pressure at several openings",
-            source="paper 002 (silencers); physics.md section 6",
-        ),
-        Cause(
-            name="spool_leak",
-            strength="leak_area_m2",
-            balance=Balance.MASS,
-            drivers=("pressures while the valve is closed",),
-            shown_by="valve closed for 20 s from two different pressures",
-            source="paper 002 (cracking ratio, P_0); physics.md 1.1 d",
-        ),
+        EXHAUST_RESTRICTION,
+        SPOOL_LEAK,
         Cause(
             name="valve_underlap",
             strength="underlap_v",
@@ -78,22 +64,8 @@ class FivePortValve(Effect):
             shown_by="slow voltage ramp through the centre",
             source="paper 000, method 3; physics.md 2.1 two-flow underlap",
         ),
-        Cause(
-            name="supply_restriction",
-            strength="supply_restriction_share",
-            balance=Balance.FLOW,
-            drivers=("command", "charging chamber pressure"),
-            shown_by="charging from ambient at several openings",
-            source="interface.md section 6 (supply areas x (1 - share))",
-        ),
-        Cause(
-            name="discharge_asymmetry",
-            strength="discharge_asymmetry",
-            balance=Balance.FLOW,
-            drivers=("direction of flow",),
-            shown_by="charging and exhausting between the same pressures",
-            source="papers 000, 004; physics.md section 6 (cd_asymmetry)",
-        ),
+        SUPPLY_RESTRICTION,
+        DISCHARGE_ASYMMETRY,
         Cause(
             name="area_shape",
             strength="area_exponent_change",
@@ -161,27 +133,14 @@ class FivePortValve(Effect):
     def _port(
         self, chamber: str, charging_m2: Expression, exhausting_m2: Expression, now: Conditions
     ) -> Iterator[MassFlow]:
-        gas, supply, outside = now[chamber], now["supply"], now["atmosphere"]
+        paths = port(now, chamber, self.gas_constant_j_kg_k)
         inlet, outlet = (
             IsoLaw(b + self.critical_ratio_change, self.cracking_ratio, self.subsonic_index)
             for b in (self.supply_critical_ratio, self.exhaust_critical_ratio)
         )
         charging_m2 *= self.supply_fraction * (1.0 - self.supply_restriction_share)
         exhausting_m2 *= self.exhaust_fraction * (1.0 - self.exhaust_restriction_share)
-        charge = path_between(supply, gas, self.gas_constant_j_kg_k)
-        vent = path_between(gas, outside)
-        into_kg_s = gas.line_share * self._flow_kg_s(charge, charging_m2, inlet, +1)
-        out_kg_s = gas.line_share * self._flow_kg_s(vent, exhausting_m2, outlet, -1)
-        yield MassFlow(chamber, into_kg_s, charge.temperature_k, inlet(charge.ratio))
-        yield MassFlow("supply", -into_kg_s, charge.temperature_k)
-        yield MassFlow(chamber, -out_kg_s, vent.temperature_k, outlet(vent.ratio))
-
-    def _flow_kg_s(self, path: Path, area_m2: Expression, law: FlowLaw, side: int) -> Expression:
-        """Flow through the controlled hole and through the closed-centre leak beside it.
-
-        ``side`` is +1 where the path's forward direction enters the chamber.
-        """
-        entering = side * (2.0 * path.forward - 1.0)
-        area_m2 *= 1.0 + self.discharge_asymmetry * entering
-        holes_m2 = area_m2 * law(path.ratio) + self.leak_area_m2 * NozzleLaw()(path.ratio)
-        return holes_m2 * path.choked_kg_s_m2
+        leak_m2, asymmetry = self.leak_area_m2, self.discharge_asymmetry
+        into_kg_s = spool_flow_kg_s(paths.charge, charging_m2, inlet, leak_m2, asymmetry)
+        out_kg_s = spool_flow_kg_s(paths.vent, exhausting_m2, outlet, leak_m2, -asymmetry)
+        yield from paths.flows(into_kg_s, out_kg_s, inlet, outlet)

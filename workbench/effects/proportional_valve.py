@@ -8,7 +8,7 @@ from math import pi
 
 import casadi as ca
 
-from workbench.air import GAS_CONSTANT_J_KG_K, NozzleLaw, Path, path_between
+from workbench.air import GAS_CONSTANT_J_KG_K, NozzleLaw, Path
 from workbench.effect import (
     Balance,
     Cause,
@@ -19,6 +19,12 @@ from workbench.effect import (
     form,
     strength,
 )
+from workbench.effects.spool_causes import (
+    DISCHARGE_ASYMMETRY,
+    EXHAUST_RESTRICTION,
+    SUPPLY_RESTRICTION,
+)
+from workbench.port import port
 
 STEEPEST_V = 0.02  # half width of the transition where the underlap is absent: a slope at the null
 EDGE = 1e-9  # of the radius: the segment's angle has no slope at the very edge of the hole
@@ -125,30 +131,9 @@ class ProportionalValve(Effect):
             shown_by="fills and vents at several openings",
             source="paper 000 Eq. 10; physics.md section 6 (area_shape)",
         ),
-        Cause(
-            name="discharge_asymmetry",
-            strength="discharge_asymmetry",
-            balance=Balance.FLOW,
-            drivers=("direction of the flow",),
-            shown_by="fills and vents at the same openings",
-            source="paper 000, section on c_d; physics.md section 6 (cd_asymmetry)",
-        ),
-        Cause(
-            name="exhaust_restriction",
-            strength="exhaust_restriction_share",
-            balance=Balance.FLOW,
-            drivers=("command", "exhausting chamber pressure"),
-            shown_by="exhaust from full pressure at several openings",
-            source="physics.md section 6 (exhaust_restriction)",
-        ),
-        Cause(
-            name="supply_restriction",
-            strength="supply_restriction_share",
-            balance=Balance.FLOW,
-            drivers=("command", "charging chamber pressure"),
-            shown_by="fills from ambient at several openings",
-            source="interface.md section 6 (supply_restriction)",
-        ),
+        DISCHARGE_ASYMMETRY,
+        EXHAUST_RESTRICTION,
+        SUPPLY_RESTRICTION,
         Cause(
             name="spool_leak",
             strength="leak_area_m2",
@@ -221,11 +206,7 @@ class ProportionalValve(Effect):
         self, chamber: str, supplied_m2: Expression, vented_m2: Expression, now: Conditions
     ) -> Iterator[MassFlow]:
         """Flows through a hole to the supply and one to the exhaust."""
-        gas = now[chamber]
-        charge = path_between(now["supply"], gas, self.gas_constant_j_kg_k)
-        vent = path_between(gas, now["atmosphere"])
-        into_kg_s = gas.line_share * charge.flow_kg_s(supplied_m2, NozzleLaw())
-        out_kg_s = gas.line_share * vent.flow_kg_s(vented_m2, NozzleLaw())
-        yield MassFlow(chamber, into_kg_s, charge.temperature_k, NozzleLaw()(charge.ratio))
-        yield MassFlow("supply", -into_kg_s, charge.temperature_k)
-        yield MassFlow(chamber, -out_kg_s, vent.temperature_k, NozzleLaw()(vent.ratio))
+        law, paths = NozzleLaw(), port(now, chamber, self.gas_constant_j_kg_k)
+        into_kg_s = paths.charge.flow_kg_s(supplied_m2, law)
+        out_kg_s = paths.vent.flow_kg_s(vented_m2, law)
+        yield from paths.flows(into_kg_s, out_kg_s, law, law)

@@ -9,7 +9,7 @@ from math import pi
 import casadi as ca
 import numpy as np
 
-from workbench.air import GAS_CONSTANT_J_KG_K, NozzleLaw, Path, path_between
+from workbench.air import GAS_CONSTANT_J_KG_K, NozzleLaw
 from workbench.effect import (
     Balance,
     Cause,
@@ -23,6 +23,7 @@ from workbench.effect import (
     strength,
 )
 from workbench.effects.forces import push_n
+from workbench.port import port
 
 VACUUM_PERMEABILITY_H_M = 4e-7 * pi
 COPPER_PER_K = 0.0039  # temperature coefficient of the coil's resistance
@@ -142,23 +143,19 @@ class SolenoidValve(Effect):
         }
 
     def terms(self, now: Conditions) -> Iterator[MassFlow]:
-        gas, lift_m = now[self.chamber], self._lift_m(now)
-        charge = path_between(now["supply"], gas, self.gas_constant_j_kg_k)
-        vent = path_between(gas, now["atmosphere"])
+        law, lift_m = NozzleLaw(), self._lift_m(now)
+        paths = port(now, self.chamber, self.gas_constant_j_kg_k)
         inlet_m2 = _seat_m2(self.inlet_diameter_m, lift_m)
         outlet_m2 = _seat_m2(self.exhaust_diameter_m, self.full_lift_m - lift_m)
         inlet_m2 *= (1.0 + self.discharge_asymmetry) * (1.0 - self.supply_restriction_share)
         outlet_m2 *= (1.0 - self.discharge_asymmetry) * (1.0 - self.exhaust_restriction_share)
-        into_kg_s = gas.line_share * self._flow_kg_s(charge, inlet_m2)
-        out_kg_s = gas.line_share * self._flow_kg_s(vent, outlet_m2)
-        yield MassFlow(self.chamber, into_kg_s, charge.temperature_k, NozzleLaw()(charge.ratio))
-        yield MassFlow("supply", -into_kg_s, charge.temperature_k)
-        yield MassFlow(self.chamber, -out_kg_s, vent.temperature_k, NozzleLaw()(vent.ratio))
+        into_kg_s = paths.charge.flow_kg_s(self._hole_m2(inlet_m2), law)
+        out_kg_s = paths.vent.flow_kg_s(self._hole_m2(outlet_m2), law)
+        yield from paths.flows(into_kg_s, out_kg_s, law, law)
 
-    def _flow_kg_s(self, path: Path, seat_m2: Expression) -> Expression:
-        """Flow through a seat and through the leak beside it."""
-        area_m2 = self.discharge_coefficient * seat_m2 + self.leak_area_m2
-        return path.flow_kg_s(area_m2, NozzleLaw())
+    def _hole_m2(self, seat_m2: Expression) -> Expression:
+        """Effective area of a seat and of the leak beside it."""
+        return self.discharge_coefficient * seat_m2 + self.leak_area_m2
 
     def rates(self, now: Conditions, received: Received) -> dict[str, Expression]:
         own, lift_m = now[self.name], self._lift_m(now)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from workbench.air import IsoLaw, NozzleLaw, Path, path_between
+from workbench.air import IsoLaw, NozzleLaw
 from workbench.effect import (
     Balance,
     Cause,
@@ -19,6 +19,13 @@ from workbench.effect import (
     form,
     strength,
 )
+from workbench.effects.spool_causes import (
+    DISCHARGE_ASYMMETRY,
+    EXHAUST_RESTRICTION,
+    SPOOL_LEAK,
+    SUPPLY_RESTRICTION,
+)
+from workbench.port import port, spool_flow_kg_s
 from workbench.spool import OpeningLaw, SmoothOpening, area_share, shut_while_stuck
 from workbench.vessel import PressureRate
 
@@ -72,14 +79,7 @@ class SpoolOpening(Effect):
             shown_by="steps to several openings",
             source="papers 000, 002; physics.md section 6 (area_shape)",
         ),
-        Cause(
-            name="discharge_asymmetry",
-            strength="discharge_asymmetry",
-            balance=Balance.FLOW,
-            drivers=("direction of flow",),
-            shown_by="filling and venting between the same pressures",
-            source="papers 000, 004; physics.md section 6 (cd_asymmetry)",
-        ),
+        DISCHARGE_ASYMMETRY,
     )
 
     chamber: str
@@ -128,30 +128,9 @@ class ThreePortValve(SpoolOpening):
 
     causes = (
         *SpoolOpening.causes,
-        Cause(
-            name="exhaust_restriction",
-            strength="exhaust_restriction_share",
-            balance=Balance.FLOW,
-            drivers=("command below centre",),
-            shown_by="venting from full pressure at several openings",
-            source="papers 002, 003; physics.md section 6",
-        ),
-        Cause(
-            name="supply_restriction",
-            strength="supply_restriction_share",
-            balance=Balance.FLOW,
-            drivers=("command above centre",),
-            shown_by="filling from ambient at several openings",
-            source="interface.md section 6 (supply areas x (1 - share))",
-        ),
-        Cause(
-            name="spool_leak",
-            strength="leak_area_m2",
-            balance=Balance.MASS,
-            drivers=("pressure while the valve is closed",),
-            shown_by="valve closed for 20 s from two different pressures",
-            source="papers 002, 004 (observed); physics.md 1.1 d",
-        ),
+        EXHAUST_RESTRICTION,
+        SUPPLY_RESTRICTION,
+        SPOOL_LEAK,
         Cause(
             name="flow_shape",
             strength="iso_share",
@@ -174,32 +153,19 @@ class ThreePortValve(SpoolOpening):
     critical_ratio: Expression = form(0.3, lower=0.05, upper=0.6)
 
     def terms(self, now: Conditions) -> Iterator[MassFlow]:
-        gas, outside = now[self.chamber], now["atmosphere"]
-        fill, vent = self.shares(now)
-        charge = path_between(now["supply"], gas, gas.gas_constant_j_kg_k)
-        outlet = path_between(gas, outside)
-        into_kg_s = gas.line_share * self._flow(
-            charge, fill * (1.0 - self.supply_restriction_share), +1
-        )
-        out_kg_s = gas.line_share * self._flow(
-            outlet, vent * (1.0 - self.exhaust_restriction_share), -1
-        )
-        yield MassFlow(self.chamber, into_kg_s, charge.temperature_k, self._law(charge))
-        yield MassFlow("supply", -into_kg_s, charge.temperature_k)
-        yield MassFlow(self.chamber, -out_kg_s, outlet.temperature_k, self._law(outlet))
+        paths, (fill, vent) = port(now, self.chamber), self.shares(now)
+        full_m2 = self.discharge_coefficient * self.flow_area_m2
+        filling_m2 = full_m2 * fill * (1.0 - self.supply_restriction_share)
+        venting_m2 = full_m2 * vent * (1.0 - self.exhaust_restriction_share)
+        law, leak_m2, asymmetry = self._law, self.leak_area_m2, self.discharge_asymmetry
+        into_kg_s = spool_flow_kg_s(paths.charge, filling_m2, law, leak_m2, asymmetry)
+        out_kg_s = spool_flow_kg_s(paths.vent, venting_m2, law, leak_m2, -asymmetry)
+        yield from paths.flows(into_kg_s, out_kg_s, law, law)
 
-    def _flow(self, path: Path, share: Expression, side: int) -> Expression:
-        """Flow along a path; ``side`` is +1 where its forward direction enters the chamber."""
-        entering = side * (2.0 * path.forward - 1.0)
-        effective = self.discharge_coefficient * (1.0 + self.discharge_asymmetry * entering)
-        leaking_m2 = self.leak_area_m2 * NozzleLaw()(path.ratio)
-        holes_m2 = effective * self.flow_area_m2 * share * self._law(path) + leaking_m2
-        return holes_m2 * path.choked_kg_s_m2
-
-    def _law(self, path: Path) -> Expression:
+    def _law(self, ratio: Expression) -> Expression:
         """Flow over the choked flow: between the nozzle's and that of ISO 6358."""
-        nozzle = NozzleLaw()(path.ratio)
-        return nozzle + self.iso_share * (IsoLaw(self.critical_ratio)(path.ratio) - nozzle)
+        nozzle = NozzleLaw()(ratio)
+        return nozzle + self.iso_share * (IsoLaw(self.critical_ratio)(ratio) - nozzle)
 
 
 @dataclass(frozen=True, kw_only=True)

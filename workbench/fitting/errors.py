@@ -8,7 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from workbench.fitting.gauss_newton import Fit
+from workbench.fitting.windows import Windows
 from workbench.units import public_name
+
+
+@dataclass(frozen=True)
+class Place:
+    """A sample: the name of its recording, and its time from the start of that."""
+
+    recording: str
+    time_s: float
 
 
 @dataclass(frozen=True)
@@ -16,13 +25,15 @@ class SignalError:
     """Error of one output: RMSE in SI, fit percent and noise.
 
     ``left_out`` are the recorded samples that it does not count, because nothing could be simulated
-    there or, in a comparison, no window reaches them.
+    there or, in a comparison, no window reaches them; ``left_out_from`` is the first that a fit
+    could not simulate.
     """
 
     rmse: float
     fit_percent: float
     noise: float
     left_out: int = 0
+    left_out_from: Place | None = None
 
     @property
     def chi2_per_sample(self) -> float:
@@ -44,16 +55,30 @@ def signal_errors(fit: Fit) -> dict[str, SignalError]:
     found, lost = {}, fit.unsimulated
     for k, name in enumerate(windows.plant.measured):
         seen = np.isfinite(windows.measured[k]) & ~lost[k]
-        noise, left_out = float(windows.noise[k]), int(lost[k].sum())
+        noise, left_out = float(windows.noise[k]), (int(lost[k].sum()), _first(windows, lost[k]))
         if not seen.any():
-            found[public_name(name)] = SignalError(np.nan, np.nan, noise, left_out)
+            found[public_name(name)] = SignalError(np.nan, np.nan, noise, *left_out)
             continue
         values, e = windows.measured[k][seen], error[k][seen]
         spread = float(np.linalg.norm(values - values.mean()))
         percent = 100.0 * (1.0 - float(np.linalg.norm(e)) / spread) if spread else np.nan
         rmse = float(np.sqrt(np.mean(e**2)))
-        found[public_name(name)] = SignalError(rmse, percent, noise, left_out)
+        found[public_name(name)] = SignalError(rmse, percent, noise, *left_out)
     return found
+
+
+def _first(windows: Windows, marked: np.ndarray) -> Place | None:
+    """Where the first of the marked samples (n_windows, L) lies; None where none is."""
+    starts = [
+        (recording, first)
+        for recording, firsts in zip(windows.recordings, windows.firsts, strict=True)
+        for first in firsts
+    ]
+    for (recording, first), samples in zip(starts, marked, strict=True):
+        if samples.any():
+            sample = first + int(np.argmax(samples))
+            return Place(recording.name, recording.sample_time_s * sample)
+    return None
 
 
 def per_sample(fit: Fit | None) -> float:
