@@ -1,17 +1,12 @@
-"""Study `identification`: the procedures of paper 002 against what was put into the truth.
+"""The procedures of paper 002 against what was put into the truth: recordings, answers, tables.
 
-python -m studies.identification [-o DIR]
-
-makes the dedicated recordings with `studies/truth/dedicated.py`, gives the procedures, in their
+Makes the dedicated recordings with `studies/truth/dedicated.py`, gives the procedures, in their
 order, rigs that are wrong in what they are to find, and prints what they found beside the truth and
-beside what paper 002 prints.  Then the drive takes over one result after the other, and its free
-run is compared with a recording that none of them saw.  With -o: the recordings as CSV, the rig
-files that read them, and the figures.
+beside what paper 002 prints.  ``workbench study identification`` runs it.
 """
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -30,7 +25,7 @@ from workbench.identification.result import Identified
 from workbench.identification.tank_curves import tank_curves
 from workbench.identification.wall_heat import wall_heat
 from workbench.recording import Recording
-from workbench.rig import Rig, load_rig
+from workbench.rig import load_rig
 from workbench.units import public_name
 
 CHANNELS = {
@@ -254,26 +249,3 @@ def write_files(data: Mapping[str, list[Recording]], folder: Path) -> None:
             lines.append(f'"{public_name(channel)}" = {{ column = "{column}", unit = "{unit}" }}')
         with whole_file(folder / f"{name}.toml") as unfinished:
             unfinished.write_text("\n".join(lines) + "\n", encoding="utf-8")
-
-
-def main() -> None:
-    """Run the study; see the module."""
-    parser = argparse.ArgumentParser(prog="python -m studies.identification", description=__doc__)
-    parser.add_argument("-o", "--output", type=Path)
-    folder = parser.parse_args().output
-    data = recordings()
-    if folder:
-        write_files(data, folder)
-    found = answers(data)
-    print(table(found), flow_table(found["flow"]), sep="\n\n")
-    if folder:
-        from studies.figures.identification import identification_figures
-        from studies.figures.style import save_all
-
-        for answer in found.values():
-            command = "python -m studies.identification -o DIR"
-            save_all(identification_figures(answer.found), folder / "figures", command)
-
-
-if __name__ == "__main__":
-    main()

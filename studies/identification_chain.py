@@ -63,8 +63,6 @@ def _errors(rig: Rig, held_out: Recording) -> dict[str, float]:
 
 def chain_text(steps: list[Step]) -> str:
     """RMSE of the free run on the held-out sine, step by step."""
-    rows = [
-        (step.name, *(shown(step.errors[name], name, 3) for name in TABLE_7)) for step in steps
-    ]
+    rows = [(step.name, *(shown(step.errors[name], name, 3) for name in TABLE_7)) for step in steps]
     rows.append(("paper 002, Table 7", *(shown(x, name, 3) for name, x in TABLE_7.items())))
     return columns(("free run, RMSE", "position", "pressure a", "pressure b"), rows)

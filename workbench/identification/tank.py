@@ -85,8 +85,8 @@ def rests_at(tank: TankOnValve, recording: Recording, level_pa: float, charged: 
     supply, ambient = tank.ends_pa(recording)
     end, word = (supply, "supply") if charged else (ambient, "ambient")
     if abs(level_pa - end) > SAME_END * (supply - ambient):
-        what = f"the tank comes to rest at {level_pa / 1e5:.3g} bar, its {word} is {end / 1e5:.3g}"
-        expected = f"the {word} pressure in the rig, absolute, as it was"
-        if charged:
-            expected += ", or supply.pressure recorded"
+        what = (
+            f"the tank comes to rest at {level_pa / 1e5:.3g} bar, its {word} is {end / 1e5:.3g} bar"
+        )
+        expected = f"the same: {word} pressure as it was, in rig or recording, and all absolute"
         raise unfit(recording, what, expected)

@@ -8,8 +8,9 @@ of the wall, and its pressure with it:
 tau is that of the exponential; conductance and coefficient of this chain are read from the
 plant's own heat law linearised at the end of the decay.  The chain makes the coefficient too large
 after a push and too small after a pull, more so for a long one, because the decay is no exponential
-(E002-15): the coefficient grows with sqrt(p T).  So the coefficient of the rig is fitted to the pressure itself, with the gas temperature
-at the stop and a leak as unknowns; the time constant that it gives at rest is told too.
+(E002-15): the coefficient grows with sqrt(p T).  So the coefficient of the rig is fitted to the
+pressure itself, with the gas temperature at the stop and a leak as unknowns; the time constant that
+it gives at rest is told too.
 
 Source: paper 002 Eqs. 16 to 19, Fig. 12, Table 4; physics.md 5, row S002-3.
 """
