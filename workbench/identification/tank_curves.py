@@ -45,9 +45,9 @@ from workbench.rig import Rig
 
 LEAN = {"b": 0.15, "a": 0.02, "m": 0.15}  # how far b, a and m of a curve lie from the rig's
 LONGEST_DEAD_TIME_S = 0.02
-ZONE = ("centre_v", "half_width_v")
 SCALES = {
-    **dict.fromkeys(ZONE, 0.05),
+    **dict.fromkeys(("centre_v", "half_width_v"), 0.05),
+    "leak_area_m2": 1e-8,
     **dict.fromkeys(("area_exponent", "supply_fraction", "exhaust_fraction"), 0.1),
     **dict.fromkeys(("supply_critical_ratio", "exhaust_critical_ratio"), 0.1),
     "cracking_ratio": 0.01,
@@ -98,12 +98,13 @@ class _Names:
     @property
     def before(self) -> list[str]:
         """What must be known before."""
-        return [*self.common[:2], f"{self.valve}.leak_area_m2"]
+        return self.common[:3]
 
     @property
     def common(self) -> list[str]:
         """The rig's own parameters that all curves share."""
         zone = [f"{self.zone}.{key}" for key in ("centre_v", "half_width_v")]
+        zone.append(f"{self.valve}.leak_area_m2")
         valve = [f"{self.valve}.area_exponent", *self.shape(True), *self.shape(False)[:2]]
         return [*zone, *valve]
 
@@ -135,7 +136,7 @@ def tank_curves(
     progress("all curves at once")
     exact = {*rig.fixed, *(name for name, spread in rig.deviations.items() if spread == 0)}
     shared = [name for name in _shown(names, pieces) if name not in exact]
-    common = _common(rig, plant, shared, pieces)
+    common = _common(rig, plant, shared, names.before, pieces)
     ends = np.cumsum([len(piece.recording) for piece in pieces])[:-1]
     return FlowFit(
         rig=rig,
@@ -199,13 +200,16 @@ def _curve(plant: Plant, names: _Names, piece: Piece, noise: float) -> TankCurve
     )
 
 
-def _common(rig: Rig, plant: Plant, names: list[str], pieces: list[Piece]) -> Solution:
+def _common(
+    rig: Rig, plant: Plant, names: list[str], before: Sequence[str], pieces: list[Piece]
+) -> Solution:
     """The rig's own parameters, fitted to all curves at once with one dead time.
 
-    The dead zone keeps what is known of it: curves every 0.2 V say less than a slow sweep.
+    The dead zone and the leak keep what is known of them: curves every 0.2 V say less than a slow
+    sweep.
     """
     known, own, channel = plant.parameters, plant.values, plant.measured[0]
-    leans = {name: rig.standard_deviation(name) for name in names if name.endswith(ZONE)}
+    leans = {name: rig.standard_deviation(name) for name in names if name in before}
     unknowns = [
         Unknown(
             own[name],
