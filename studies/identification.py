@@ -115,10 +115,10 @@ def recordings_of_heat() -> list[Recording]:
     ]
 
 
-def recordings_of_flow(step_v: float) -> list[Recording]:
+def recordings_of_flow(step_v: float, tank: truth.Tank = TANK) -> list[Recording]:
     """A tank curve every so many volts."""
     command_v = np.round(np.arange(0.0, 10.0 + 1e-9, step_v), 3)
-    return named(truth.tank_curves(TANK, command_v, seed=1), "curve")
+    return named(truth.tank_curves(tank, command_v, seed=1), "curve")
 
 
 def recordings_of_friction() -> list[Recording]:

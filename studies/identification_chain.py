@@ -1,6 +1,7 @@
 """One identified result after the other, taken over by the drive, and what its free run gains.
 
-The tank's valve goes onto the drive (``--into`` on the command line).  The judge is a sine of the
+The valve is measured on a tank and goes onto the drive (``--into`` on the command line): one whose
+area is that of the true drive, unlike that of the flow study's own tank.  The judge is a sine of the
 command that no procedure saw: paper 002, Fig. 20 and Table 7 (S002-11).
 """
 
@@ -11,11 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from studies.identification import DRIVE, WRONG_DRIVE, Answer, recording
+from studies.identification import DRIVE, WRONG_DRIVE, Answer, recording, recordings_of_flow
 from studies.text import columns, shown
 from studies.truth import dedicated as truth
 from workbench.comparison import compare
 from workbench.identification import PROCEDURES
+from workbench.identification.tank_curves import tank_curves
 from workbench.recording import Recording
 from workbench.rig import Rig, load_rig
 
@@ -26,6 +28,10 @@ TABLE_7 = {
     "chamber_b.pressure_pa": 0.209e5,
 }
 """RMSE of paper 002, Table 7."""
+VALVE = truth.TankValve(
+    supply_exponent=DRIVE.area_exponent, exhaust_exponent=DRIVE.area_exponent, ripple=0.0
+)
+CURVES_EVERY_V = 1.0
 AMPLITUDE_V, FREQUENCY_HZ, LENGTH_S, START_M = 0.8, 0.5, 4.0, 0.04
 
 
@@ -48,10 +54,12 @@ def sine() -> Recording:
 
 def chain(found: Mapping[str, Answer], held_out: Recording) -> list[Step]:
     """The drive as it was bought, then with one result more at each step."""
-    rig = load_rig(WRONG_DRIVE)
+    rig, results = load_rig(WRONG_DRIVE), {name: each.found for name, each in found.items()}
+    curves = recordings_of_flow(CURVES_EVERY_V, truth.Tank(VALVE))
+    results["flow"] = tank_curves(results["dead-zone"].improved(), curves)
     steps = [Step("as it was bought", rig, _errors(rig, held_out))]
     for name in PROCEDURES:
-        rig = found[name].found.improved(rig)
+        rig = results[name].improved(rig)
         steps.append(Step(f"+ {name}", rig, _errors(rig, held_out)))
     return steps
 

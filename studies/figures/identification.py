@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 PA_PER_BAR = 1e5
 GOAL_BAR = 0.04  # what paper 002 reports
 SHOWN_M2 = 1e-7  # below, a path is closed and its shape is not seen
+LABELS_APART = 1.9  # ratio of half times below which two labels would touch
 SMOOTHED = 50  # samples of a residual
 
 
@@ -60,27 +61,33 @@ def flow_figure(found: FlowFit) -> Figure:
 
 
 def _tank_curves(axes: Axes, curves: list[TankCurve]) -> None:
-    """At most nine curves over the logarithm of time, each with its command at half its way."""
-    for k, curve in enumerate(curves[:: max(len(curves) // 8, 1)]):
+    """Some nine curves over the logarithm of time; those that lie apart bear their command."""
+    labelled_s = 0.0
+    chosen = curves[:: max(len(curves) // 8, 1)]
+    for curve in sorted(chosen, key=_half_time_s):
         time_s, measured, fitted = (
             column[1:] for column in thinned(curve.along, curve.measured, curve.fitted)
         )
-        names = ("measured", "fitted") if not k else ("_", "_")
+        names = ("_", "_") if labelled_s else ("measured", "fitted")
         axes.plot(time_s, measured / PA_PER_BAR, "-", color=GREY, linewidth=2.0, label=names[0])
         axes.plot(time_s, fitted / PA_PER_BAR, "--", color=BLUE, label=names[1])
-        way = (measured - measured[0]) / (measured[-1] - measured[0])
-        half = int(np.argmax(way > 0.3 + 0.4 * (k % 2)))
-        axes.annotate(
-            f"{curve.command_v:g} V",
-            (time_s[half], measured[half] / PA_PER_BAR),
-            ha="center",
-            va="center",
-            fontsize=6,
-            bbox={"boxstyle": "round,pad=0.1", "facecolor": "white", "edgecolor": "none"},
-        )
+        half_s = _half_time_s(curve)
+        if half_s < LABELS_APART * labelled_s:
+            continue
+        labelled_s = half_s
+        level = float(np.interp(half_s, curve.along, curve.fitted)) / PA_PER_BAR
+        white = {"boxstyle": "round,pad=0.1", "facecolor": "white", "edgecolor": "none"}
+        where = {"ha": "center", "va": "center", "fontsize": 6, "bbox": white}
+        axes.annotate(f"{curve.command_v:.1f} V", (half_s, level), **where)
     axes.set_xscale("log")
     axes.set_xlabel("time from the opening (s)")
     axes.legend(loc="upper left" if curves and curves[0].charging else "lower left")
+
+
+def _half_time_s(curve: TankCurve) -> float:
+    """When the pressure has gone half its way."""
+    way = (curve.fitted - curve.fitted[0]) / (curve.fitted[-1] - curve.fitted[0])
+    return float(curve.along[np.argmax(way > 0.5)])
 
 
 def _over_command(axes: Axes, found: FlowFit, key: str, scale: float) -> None:
