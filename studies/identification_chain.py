@@ -1,8 +1,8 @@
 """One identified result after the other, taken over by the drive, and what its free run gains.
 
 The valve is measured on a tank and goes onto the drive (``--into`` on the command line): one whose
-area is that of the true drive, unlike that of the flow study's own tank.  The judge is a sine of the
-command that no procedure saw: paper 002, Fig. 20 and Table 7 (S002-11).
+area is that of the true drive, unlike that of the flow study's own tank.  The judge is a sine of
+the command that no procedure saw: paper 002, Fig. 20 and Table 7 (S002-11).
 """
 
 from __future__ import annotations
