@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 PA_PER_BAR = 1e5
 GOAL_BAR = 0.04  # what paper 002 reports
 SHOWN_M2 = 1e-7  # below, a path is closed and its shape is not seen
-LABELS_APART = 1.9  # ratio of half times below which two labels would touch
+LABELS_APART = 2.2  # ratio of half times below which two labels would touch
 SMOOTHED = 50  # samples of a residual
 
 

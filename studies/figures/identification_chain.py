@@ -31,7 +31,15 @@ def chain_figure(
             values = [scale.from_si(each[channel]) for each in errors]
             axes.barh(rows, values, color=BLUE, height=0.6)
             for row, value in zip(rows, values, strict=True):
-                axes.annotate(f" {value:.3g}", (value, row), va="center", fontsize=7)
+                axes.annotate(
+                    f"{value:.3g}",
+                    (value, row),
+                    xytext=(3, 0),
+                    textcoords="offset points",
+                    va="center",
+                    fontsize=7,
+                    bbox={"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none"},
+                )
             axes.axvline(
                 scale.from_si(line), color=BLACK, linestyle=":", label="paper 002, Table 7"
             )
