@@ -106,6 +106,16 @@ def test_flow_behind_a_wrong_dead_zone_is_wrong(flow, curves):
     assert not set(ZONE) & {each.name for each in wrong.parameters}
 
 
+def test_the_dead_zone_goes_onto_the_drive_with_the_flow(flow, limits):
+    noted = replace(flow, rig=replace(flow.rig, notes=("dead-zone identified valve.leak_area",)))
+    drive = noted.improved(DRIVE, "flow identified valve.area_exponent")
+
+    for name in ZONE:
+        assert drive.plant.values[name] == limits[name].value
+        assert drive.deviations[name] == limits[name].deviation
+    assert [note.split()[0] for note in drive.notes] == ["dead-zone", "flow"]
+
+
 def test_a_path_without_curves_keeps_what_the_rig_had(flow, curves):
     charging = [each for each in curves if each["valve.command_v"][-1] > 5.0]
     found = tank_curves(flow.rig, charging)

@@ -65,12 +65,15 @@ class Identified:
         Values of the rig's own parameters, by full name.
     curves
         Measured and fitted, with the residuals.
+    carried
+        What an earlier procedure found and these values rely on: it goes along into another rig.
     """
 
     rig: Rig
     estimates: tuple[Estimate, ...]
     parameters: tuple[Estimate, ...]
     curves: tuple[Curve, ...]
+    carried: tuple[Estimate, ...] = ()
 
     def __getitem__(self, name: str) -> Estimate:
         found = {each.name: each for each in (*self.estimates, *self.parameters)}
@@ -93,7 +96,8 @@ class Identified:
         """
         rig = self.rig if into is None else into
         known = rig.plant.parameters
-        taken = [e for e in self.parameters if e.name in known and e.name not in rig.fixed]
+        every = (*self.parameters, *(self.carried if into else ()))
+        taken = [e for e in every if e.name in known and e.name not in rig.fixed]
         if not taken:
             names = listed(public_name(each.name) for each in self.parameters)
             raise InputError(Message("takes none of what was identified", rig.name, names))
@@ -107,8 +111,14 @@ class Identified:
             plant=rig.plant.with_values(values),
             removed=tuple(name for name in rig.removed if strengths[name] not in values),
             deviations={**rig.deviations, **deviations},
-            notes=_with_note(rig.notes, note),
+            notes=_with_notes(rig.notes, *(self._earlier if into else ()), note),
         )
+
+    @property
+    def _earlier(self) -> list[str]:
+        """What the rig says of where the carried values come from."""
+        names = [public_name(each.name) for each in self.carried]
+        return [note for note in self.rig.notes if any(name in note for name in names)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,12 +157,12 @@ class Procedure:
         return f"{self.name} identified {names} from {read}; {self.source}"
 
 
-def _with_note(notes: tuple[str, ...], note: str) -> tuple[str, ...]:
-    """The notes and a new one, in place of what the same procedure said before."""
-    if not note:
-        return notes
-    begins = " ".join(note.split()[:2])
-    return (*(each for each in notes if not each.startswith(begins)), note)
+def _with_notes(notes: tuple[str, ...], *new: str) -> tuple[str, ...]:
+    """The notes and new ones, each in place of what the same procedure said before."""
+    for note in filter(None, new):
+        begins = " ".join(note.split()[:2])
+        notes = (*(each for each in notes if not each.startswith(begins)), note)
+    return notes
 
 
 def known_before(rig: Rig, names: Iterable[str], first: str, why: str) -> None:

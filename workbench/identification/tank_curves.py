@@ -46,8 +46,6 @@ from workbench.rig import Rig
 LEAN = {"b": 0.15, "a": 0.02, "m": 0.15}  # how far b, a and m of a curve lie from the rig's
 LONGEST_DEAD_TIME_S = 0.02
 SCALES = {
-    **dict.fromkeys(("centre_v", "half_width_v"), 0.05),
-    "leak_area_m2": 1e-8,
     **dict.fromkeys(("area_exponent", "supply_fraction", "exhaust_fraction"), 0.1),
     **dict.fromkeys(("supply_critical_ratio", "exhaust_critical_ratio"), 0.1),
     "cracking_ratio": 0.01,
@@ -97,16 +95,14 @@ class _Names:
 
     @property
     def before(self) -> list[str]:
-        """What must be known before."""
-        return self.common[:3]
+        """What must be known before, and stays."""
+        zone = [f"{self.zone}.{key}" for key in ("centre_v", "half_width_v")]
+        return [*zone, f"{self.valve}.leak_area_m2"]
 
     @property
     def common(self) -> list[str]:
         """The rig's own parameters that all curves share."""
-        zone = [f"{self.zone}.{key}" for key in ("centre_v", "half_width_v")]
-        zone.append(f"{self.valve}.leak_area_m2")
-        valve = [f"{self.valve}.area_exponent", *self.shape(True), *self.shape(False)[:2]]
-        return [*zone, *valve]
+        return [f"{self.valve}.area_exponent", *self.shape(True), *self.shape(False)[:2]]
 
 
 def tank_curves(
@@ -134,14 +130,18 @@ def tank_curves(
         progress(f"curve {k} of {len(pieces)}, {piece.command_v:.2f} V")
         curves.append(_curve(plant, names, piece, noise))
     progress("all curves at once")
-    exact = {*rig.fixed, *(name for name, spread in rig.deviations.items() if spread == 0)}
-    shared = [name for name in _shown(names, pieces) if name not in exact]
-    common = _common(rig, plant, shared, names.before, pieces)
+    shared = [name for name in _shown(names, pieces) if name not in rig.fixed]
+    common = _common(plant, shared, pieces)
     ends = np.cumsum([len(piece.recording) for piece in pieces])[:-1]
     return FlowFit(
         rig=rig,
         estimates=(_mean_error(curves),),
         parameters=estimated(shared, common.values[:-1], common.deviations[:-1]),
+        carried=tuple(
+            Estimate(name, rig.plant.values[name], rig.deviations[name])
+            for name in names.before
+            if name in rig.deviations
+        ),
         curves=tuple(curves),
         rig_errors_pa=tuple(
             float(np.mean(np.abs(left))) for left in np.split(common.residuals, ends)
@@ -200,24 +200,14 @@ def _curve(plant: Plant, names: _Names, piece: Piece, noise: float) -> TankCurve
     )
 
 
-def _common(
-    rig: Rig, plant: Plant, names: list[str], before: Sequence[str], pieces: list[Piece]
-) -> Solution:
+def _common(plant: Plant, names: list[str], pieces: list[Piece]) -> Solution:
     """The rig's own parameters, fitted to all curves at once with one dead time.
 
-    The dead zone and the leak keep what is known of them: curves every 0.2 V say less than a slow
-    sweep.
+    The dead zone stays: one law of area for all commands would bend its limits to fit better.
     """
     known, own, channel = plant.parameters, plant.values, plant.measured[0]
-    leans = {name: rig.standard_deviation(name) for name in names if name in before}
     unknowns = [
-        Unknown(
-            own[name],
-            SCALES[name.rpartition(".")[2]],
-            known[name].lower,
-            known[name].upper,
-            leans.get(name, np.inf),
-        )
+        Unknown(own[name], SCALES[name.rpartition(".")[2]], known[name].lower, known[name].upper)
         for name in names
     ]
     unknowns.append(Unknown(3e-3, 3e-3, 0.0, LONGEST_DEAD_TIME_S))
