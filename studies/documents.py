@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from workbench.comparison.compare import Comparison, RecordingComparison
     from workbench.diagnosis.result import Diagnosis, Law, NextRecording, Ranked, Where
     from workbench.fitting.errors import SignalError
-    from workbench.identification.result import Estimate, Identified
+    from workbench.identification.result import Estimate, Identified, Procedure
     from workbench.plant import Candidate
 
 Document = dict[str, Any]
@@ -223,8 +223,9 @@ def _next_recording(asked: NextRecording | None) -> Document | None:
     }
 
 
-def identification_document(procedure: str, found: Identified) -> Document:
+def identification_document(procedure: Procedure, found: Identified) -> Document:
     """What an identification procedure found, in SI; parameters are those of the rig."""
+    printed = procedure.printed
 
     def told(estimates: tuple[Estimate, ...]) -> Document:
         return {
@@ -232,13 +233,15 @@ def identification_document(procedure: str, found: Identified) -> Document:
                 "value": plain(each.value),
                 "unit": si_unit(each.name),
                 "std": plain(each.deviation),
+                **({"paper": plain(printed[each.name])} if each.name in printed else {}),
             }
             for each in estimates
         }
 
     return {
         "schema": "workbench.identification/1",
-        "procedure": procedure,
+        "procedure": procedure.name,
+        "source": procedure.source,
         "rig": found.rig.name,
         "estimates": told(found.estimates),
         "parameters": told(found.parameters),

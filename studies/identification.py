@@ -1,15 +1,12 @@
-"""Study `identification`: the procedures of paper 002 against what was put into the truth.
+"""The procedures of paper 002 against what was put into the truth: recordings, answers, tables.
 
-python -m studies.identification [-o DIR]
-
-makes the dedicated recordings with `studies/truth/dedicated.py`, gives each procedure a rig that is
-wrong in what it is to find, and prints what it found beside the truth and beside what paper 002
-prints.  With -o: the recordings as CSV, two rig files that read them, and the figures.
+Makes the dedicated recordings with `studies/truth/dedicated.py`, gives the procedures, in their
+order, rigs that are wrong in what they are to find, and prints what they found beside the truth and
+beside what paper 002 prints.  ``workbench study identification`` runs it.
 """
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,6 +17,7 @@ from studies.text import columns, percent, shown
 from studies.truth import dedicated as truth
 from studies.truth import drive as true
 from workbench.errors import whole_file
+from workbench.identification import PROCEDURES
 from workbench.identification.dead_volume import dead_volume
 from workbench.identification.dead_zone import dead_zone
 from workbench.identification.friction import friction
@@ -27,7 +25,7 @@ from workbench.identification.result import Identified
 from workbench.identification.tank_curves import tank_curves
 from workbench.identification.wall_heat import wall_heat
 from workbench.recording import Recording
-from workbench.rig import Rig, load_rig
+from workbench.rig import load_rig
 from workbench.units import public_name
 
 CHANNELS = {
@@ -59,6 +57,11 @@ plant = "servo_reservoir"
 WRONG_DRIVE = """name = "drive as it was bought"
 plant = "servo_drive"
 [values]
+"valve_dead_zone.half_width" = "0.35 V"
+"valve_dead_zone.centre" = "5 V"
+"valve.supply_fraction" = 0.7
+"valve.exhaust_fraction" = 0.75
+"valve.leak_area" = "0.03 mm^2"
 "wall_heat.coefficient" = "40 W/(m^2 K)"
 "friction.coulomb_force" = "18 N"
 "friction.stiction_excess" = "10 N"
@@ -70,21 +73,8 @@ plant = "servo_drive"
 RUNS_V = np.array([5.5, 5.6, 5.8, 6.0, 6.3, 4.4, 4.3, 4.1, 3.9, 3.6])
 STICKING_V = np.array([5.385, 5.38, 4.52, 4.515])
 PUSH_M = (0.25, 0.12)
-PRINTED = {
-    "lower_limit_v": 4.53,
-    "upper_limit_v": 5.37,
-    "time_constant_s": 0.662,
-    "conductance_w_k": 0.221,
-    "wall_heat.coefficient_w_m2_k": 22.563,
-    "static_forward_n": 50.97,
-    "coulomb_forward_n": 28.35,
-    "viscous_forward_n_s_m": 46.01,
-    "static_backward_n": 46.15,
-    "coulomb_backward_n": 26.22,
-    "viscous_backward_n_s_m": 42.18,
-    "chamber_a.total_volume_m3": 1.734e-4,
-    "chamber_b.total_volume_m3": 1.976e-4,
-}
+PULL_M = (0.12, true.STROKE_M)
+"""Ends with the chamber full at ambient, where the paper's time constant was measured."""
 
 
 @dataclass(frozen=True)
@@ -106,7 +96,7 @@ def recordings() -> dict[str, list[Recording]]:
     return {
         "flow": recordings_of_flow(0.2),
         "dead-zone": [recording(truth.static_map(TANK, seed=2), "map")],
-        "wall-heat": [recording(truth.pushed_piston(DRIVE, *PUSH_M, seed=3), "push")],
+        "wall-heat": recordings_of_heat(),
         "dead-volume": [
             recording(truth.reservoir_release(DRIVE, true.STROKE_M, "a", seed=4), "release_a"),
             recording(truth.reservoir_release(DRIVE, 0.0, "b", seed=5), "release_b"),
@@ -115,10 +105,20 @@ def recordings() -> dict[str, list[Recording]]:
     }
 
 
-def recordings_of_flow(step_v: float) -> list[Recording]:
+def recordings_of_heat() -> list[Recording]:
+    """A pull that ends as the paper's did, and a push."""
+    volume_m3 = [DRIVE.dead_volume_a_m3 + true.PISTON_AREA_M2 * length_m for length_m in PULL_M]
+    start_pa = DRIVE.ambient_pressure_pa * volume_m3[1] / volume_m3[0]
+    return [
+        recording(truth.pushed_piston(DRIVE, *PULL_M, seed=8, start_pa=start_pa), "pull"),
+        recording(truth.pushed_piston(DRIVE, *PUSH_M, seed=3), "push"),
+    ]
+
+
+def recordings_of_flow(step_v: float, tank: truth.Tank = TANK) -> list[Recording]:
     """A tank curve every so many volts."""
     command_v = np.round(np.arange(0.0, 10.0 + 1e-9, step_v), 3)
-    return named(truth.tank_curves(TANK, command_v, seed=1), "curve")
+    return named(truth.tank_curves(tank, command_v, seed=1), "curve")
 
 
 def recordings_of_friction() -> list[Recording]:
@@ -150,7 +150,7 @@ def true_values() -> dict[str, dict[str, float]]:
     return {
         "flow": {},
         "dead-zone": {**limits, "valve.leak_area_m2": TANK.valve.leak_m2},
-        "wall-heat": {"wall_heat.coefficient_w_m2_k": DRIVE.heat_transfer_w_m2_k},
+        "wall-heat": true_heat(),
         "dead-volume": {
             **{f"chamber_{side}.total_volume_m3": each + swept for side, each in dead.items()},
             **{f"chamber_{side}.dead_volume_m3": each for side, each in dead.items()},
@@ -159,40 +159,49 @@ def true_values() -> dict[str, dict[str, float]]:
     }
 
 
+def true_heat() -> dict[str, float]:
+    """Coefficient, and the time constant at rest where the pull ends.
+
+    tau = m c_v / k,    k = lambda A sqrt(p / p_0), gas and wall at room temperature
+    """
+    length_m, end_pa = PULL_M[1], DRIVE.ambient_pressure_pa
+    volume_m3 = DRIVE.dead_volume_a_m3 + true.PISTON_AREA_M2 * length_m
+    surface_m2 = 2 * true.PISTON_AREA_M2 + np.pi * true.BORE_M * length_m
+    mass_kg = end_pa * volume_m3 / (true.GAS_CONSTANT_J_KG_K * true.HEAT_TEMPERATURE_K)
+    load = float(np.sqrt(end_pa / true.HEAT_PRESSURE_PA))
+    conductance_w_k = DRIVE.heat_transfer_w_m2_k * surface_m2 * load
+    return {
+        "rest_time_constant_s": mass_kg * true.CV_J_KG_K / conductance_w_k,
+        "wall_heat.coefficient_w_m2_k": DRIVE.heat_transfer_w_m2_k,
+    }
+
+
 def answers(data: Mapping[str, list[Recording]]) -> dict[str, Answer]:
-    """What each procedure finds in its recordings; flow behind the dead zone, for its leak."""
+    """What the procedures find, each in its recordings and behind what must be known before."""
     tank, drive = load_rig(WRONG_TANK), load_rig(WRONG_DRIVE)
     limits = dead_zone(tank, data["dead-zone"])
-    runs = {
-        "dead-zone": lambda read: limits,
-        "flow": lambda read: tank_curves(limits.improved(), read),
-        "wall-heat": lambda read: wall_heat(with_dead_volumes(drive), read),
-        "dead-volume": lambda read: dead_volume(drive, read),
-        "friction": lambda read: friction(drive, read),
+    volumes = dead_volume(drive, data["dead-volume"])
+    found = {
+        "dead-zone": limits,
+        "flow": tank_curves(limits.improved(), data["flow"]),
+        "dead-volume": volumes,
+        "wall-heat": wall_heat(volumes.improved(), data["wall-heat"]),
+        "friction": friction(drive, data["friction"]),
     }
     known = true_values()
-    return {name: Answer(runs[name](read), known[name]) for name, read in data.items()}
-
-
-def with_dead_volumes(rig: Rig) -> Rig:
-    """The rig with its true dead volumes: heat is identified after them, since p_f V is the gas."""
-    values = {
-        "chamber_a.dead_volume_m3": DRIVE.dead_volume_a_m3,
-        "chamber_b.dead_volume_m3": DRIVE.dead_volume_b_m3,
-    }
-    return replace(rig, plant=rig.plant.with_values(values))
+    return {name: Answer(each, known[name]) for name, each in found.items()}
 
 
 def table(found: Mapping[str, Answer]) -> str:
     """One line per number: paper 002, truth, rig before, identified, error."""
     rows = []
     for name, answer in found.items():
-        before = answer.found.rig.plant.values
+        before, print_of = answer.found.rig.plant.values, PROCEDURES[name].printed
         for each in (*answer.found.estimates, *answer.found.parameters):
-            if each.name not in answer.true and each.name not in PRINTED:
+            if each.name not in answer.true and each.name not in print_of:
                 continue
             real = answer.true.get(each.name, float("nan"))
-            printed = PRINTED.get(each.name, float("nan"))
+            printed = print_of.get(each.name, float("nan"))
             had = before.get(each.name, float("nan"))
             numbers = (printed, real, had, each.value, each.deviation)
             error = percent(each.value / real - 1.0, 1)
@@ -240,26 +249,3 @@ def write_files(data: Mapping[str, list[Recording]], folder: Path) -> None:
             lines.append(f'"{public_name(channel)}" = {{ column = "{column}", unit = "{unit}" }}')
         with whole_file(folder / f"{name}.toml") as unfinished:
             unfinished.write_text("\n".join(lines) + "\n", encoding="utf-8")
-
-
-def main() -> None:
-    """Run the study; see the module."""
-    parser = argparse.ArgumentParser(prog="python -m studies.identification", description=__doc__)
-    parser.add_argument("-o", "--output", type=Path)
-    folder = parser.parse_args().output
-    data = recordings()
-    if folder:
-        write_files(data, folder)
-    found = answers(data)
-    print(table(found), flow_table(found["flow"]), sep="\n\n")
-    if folder:
-        from studies.figures.identification import identification_figures
-        from studies.figures.style import save_all
-
-        for answer in found.values():
-            command = "python -m studies.identification -o DIR"
-            save_all(identification_figures(answer.found), folder / "figures", command)
-
-
-if __name__ == "__main__":
-    main()

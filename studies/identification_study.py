@@ -9,29 +9,47 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 from studies.figures.identification import identification_figures
+from studies.figures.identification_chain import chain_figure
 from studies.identification import Answer, answers, flow_table, recordings, table, write_files
+from studies.identification_chain import TABLE_7, Step, chain, chain_text, sine
 from studies.study import Claim, Extent, Outcome, Study
 
 CLAIMED_V = ((1.0, 4.5), (5.5, 10.0))  # where the paper's tank curves fit
 LARGEST_ERROR_PA = 4e3
 CLOSE_V = 0.02
+POSITION = "slide.position_m"
+LEAST_FALL = 0.9  # of the position's error on the drive
 CLOSE = {"wall-heat": 0.05, "dead-volume": 0.02, "friction": 0.05}  # relative
 
 
 def run(folder: Path, extent: Extent, say: Callable[[str], None]) -> Outcome:
     """Record, identify, and compare; the recordings stay in the folder with rigs that read them."""
     say("recordings of the truth")
-    data = recordings()
-    write_files(data, folder / "recordings")
+    data, held_out = recordings(), sine()
+    write_files({**data, "held out": [held_out]}, folder / "recordings")
     say("identification")
     found = answers(data)
+    say("free runs on a recording that no procedure saw")
+    steps = chain(found, held_out)
     figures = {
         name: figure
         for answer in found.values()
         for name, figure in identification_figures(answer.found).items()
     }
-    text = f"{table(found)}\n\n{flow_table(found['flow'])}"
-    return Outcome(text, tuple(_claims(found)), figures, {"found": _numbers(found)})
+    names, errors = [step.name for step in steps], [step.errors for step in steps]
+    figures["chain"] = chain_figure(names, errors, TABLE_7)
+    text = f"{table(found)}\n\n{flow_table(found['flow'])}\n\n{chain_text(steps)}"
+    numbers = {"found": _numbers(found), "chain": dict(zip(names, errors, strict=True))}
+    return Outcome(text, (*_claims(found), *_claims_of_chain(steps)), figures, numbers)
+
+
+def _claims_of_chain(steps: list[Step]) -> Iterator[Claim]:
+    first, last = steps[0].errors, steps[-1].errors
+    fall = 1.0 - last[POSITION] / first[POSITION]
+    claim = f"position error of the drive's free run falls by {LEAST_FALL:.0%}"
+    yield Claim(claim, f"{fall:.0%}", fall >= LEAST_FALL)
+    share = max(last[name] / value for name, value in TABLE_7.items() if name != POSITION)
+    yield Claim("its pressure errors below paper 002, Table 7", f"{share:.0%} of it", share <= 1.0)
 
 
 def _claims(found: Mapping[str, Answer]) -> Iterator[Claim]:

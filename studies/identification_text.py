@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from math import isfinite
+from math import isfinite, nan
+from textwrap import fill
 
 from studies.text import columns, shown
 from workbench.errors import InputError, Message, listed, nearest
@@ -14,11 +15,36 @@ from workbench.identification.result import Estimate, Identified, Procedure
 from workbench.identification.tank_curves import FlowFit
 from workbench.units import UnitError, public_name, quantity
 
+WIDTH = 100  # of a guide, in characters
+
 
 def procedures_text() -> str:
-    """One line per procedure: its name, what it gives, and the recording it needs."""
-    rows = [(each.name, each.gives, each.manoeuvre) for each in PROCEDURES.values()]
-    return columns(("procedure", "gives", "the recording it needs"), rows)
+    """One line per procedure, in their order: what it gives, and the recording it needs."""
+    rows = [(e.name, e.first or "-", e.gives, e.manoeuvre) for e in PROCEDURES.values()]
+    table = columns(("procedure", "after", "gives", "the recording it needs"), rows)
+    return f"{table}\n\nworkbench identify PROCEDURE tells what to record and how it is called"
+
+
+def guide_text(name: str) -> str:
+    """How one procedure is done: what comes first, what to record, and the command."""
+    each = known_procedure(name)
+    after = f"{each.first}, whose result the rig must hold" if each.first else "nothing"
+    printed = ", ".join(f"{public_name(n)} {shown(x, n)}" for n, x in each.printed.items())
+    rows = (
+        ("gives", each.gives),
+        ("after", after),
+        ("do", each.manoeuvre),
+        ("record", each.channels),
+        ("then", f"workbench identify {each.example}"),
+        ("source", each.source),
+        ("printed", f"{printed} (of the paper's own drive)"),
+    )
+    width = max(len(word) for word, _ in rows) + 4
+    lines = [
+        fill(said, WIDTH, initial_indent=f"  {word}".ljust(width), subsequent_indent=" " * width)
+        for word, said in rows
+    ]
+    return "\n".join([name, *lines])
 
 
 def known_procedure(name: str, tank: str | None = None) -> Procedure:
@@ -45,12 +71,14 @@ def known_procedure(name: str, tank: str | None = None) -> Procedure:
     return replace(found, run=partial(found.run, tank_volume_m3=volume_m3))
 
 
-def identified_text(found: Identified) -> str:
-    """What was identified with standard deviations, and what the rig had."""
-    own = found.rig.plant.values
-    rows = [_row(each, "-") for each in found.estimates]
-    rows += [_row(each, shown(own[each.name], each.name)) for each in found.parameters]
-    text = columns(("identified", "value", "deviation", "rig had"), rows)
+def identified_text(procedure: Procedure, found: Identified) -> str:
+    """What was identified with standard deviations, what the rig had, and what the paper prints."""
+    own, fixed = found.rig.plant.values, found.rig.fixed
+    rows = [_row(each, "-", procedure) for each in found.estimates]
+    for each in found.parameters:
+        stays = ", fixed" if each.name in fixed else ""
+        rows.append(_row(each, shown(own[each.name], each.name) + stays, procedure))
+    text = columns(("identified", "value", "deviation", "rig had", "paper 002"), rows)
     if isinstance(found, FlowFit):
         return f"{flow_text(found)}\n\n{text}"
     errors = ", ".join(
@@ -82,6 +110,7 @@ def _measured(found: Identified) -> str:
     return "error_n" if hasattr(found, "break_aways") else "error_pa"
 
 
-def _row(each: Estimate, had: str) -> tuple[str, str, str, str]:
+def _row(each: Estimate, had: str, procedure: Procedure) -> tuple[str, ...]:
     spread = shown(each.deviation, each.name, 2) if isfinite(each.deviation) else "-"
-    return public_name(each.name), shown(each.value, each.name), spread, had
+    printed = shown(procedure.printed.get(each.name, nan), each.name)
+    return public_name(each.name), shown(each.value, each.name), spread, had, printed

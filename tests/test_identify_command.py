@@ -15,10 +15,26 @@ from workbench.rig import load_rig
 def test_identify_lists_every_procedure_with_its_recording():
     lines = call("identify").stdout.splitlines()
 
+    rows = lines[1 : 1 + len(PROCEDURES)]
     assert "identify" in ORDER
-    assert [line.split()[0] for line in lines[1:]] == list(PROCEDURES)
-    for line, each in zip(lines[1:], PROCEDURES.values(), strict=True):
+    assert [line.split()[0] for line in rows] == list(PROCEDURES)
+    for line, each in zip(rows, PROCEDURES.values(), strict=True):
         assert each.manoeuvre in line
+    for each in PROCEDURES.values():
+        names = list(PROCEDURES)
+        assert not each.first or names.index(each.first) < names.index(each.name)
+
+
+@pytest.mark.parametrize("name", PROCEDURES)
+def test_a_procedure_alone_is_told_how_it_is_done(name):
+    answer = call("identify", name)
+    said = " ".join(answer.stdout.split())
+
+    assert answer.exit_code == 0
+    for part in (PROCEDURES[name].manoeuvre, PROCEDURES[name].channels, PROCEDURES[name].source):
+        assert part in said
+    assert f"workbench identify {name}" in said
+    assert max(map(len, answer.stdout.splitlines())) <= 100
 
 
 def test_identify_writes_a_rig_with_what_it_found(tmp_path):
@@ -34,7 +50,12 @@ def test_identify_writes_a_rig_with_what_it_found(tmp_path):
     document = json.loads(out.read_text())
     assert document["schema"] == "workbench.identification/1"
     told = document["parameters"]["chamber_a.dead_volume"]["value"]
-    assert load_rig(better).plant.values["chamber_a.dead_volume_m3"] == pytest.approx(told)
+    assert document["estimates"]["chamber_a.total_volume"]["paper"] == pytest.approx(1.734e-4)
+    assert "173.4 cm^3" in answer.stdout
+    written = load_rig(better)
+    assert written.plant.values["chamber_a.dead_volume_m3"] == pytest.approx(told)
+    assert written.deviations["chamber_a.dead_volume_m3"] > 0
+    assert written.notes[0].startswith("dead-volume identified chamber_a.dead_volume from release")
     assert (tmp_path / "dead_volume.svg").exists()
 
 
@@ -42,7 +63,8 @@ def test_identify_writes_a_rig_with_what_it_found(tmp_path):
     ("words", "said"),
     [
         (["dead-zon"], "did you mean 'dead-zone'?"),
-        (["friction"], "needs a rig and recordings; expected one constant command"),
+        (["friction", "rig.toml"], "needs recordings; expected one constant command"),
+        (["friction", "rig.toml", "a.csv", "--into", "b.toml"], "writes nothing without -o"),
         (["friction", "rig.toml", "a.csv", "--tank", "1 l"], "takes no volume of a tank"),
         (["dead-volume", "rig.toml", "a.csv", "--tank", "1 bar"], "does not fit"),
     ],

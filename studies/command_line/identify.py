@@ -32,6 +32,12 @@ def identify(
     output: Annotated[
         Path | None, typer.Option("--output", "-o", metavar="FILE", help="The rig with the values.")
     ] = None,
+    into: Annotated[
+        Path | None,
+        typer.Option(
+            "--into", metavar="RIG", help="Another rig that -o takes: a tank's valve on a drive."
+        ),
+    ] = None,
     tank: Annotated[
         str | None,
         typer.Option("--tank", metavar="VOLUME", help="Of dead-volume's tank; 0.344 l."),
@@ -40,15 +46,21 @@ def identify(
     json: Json = None,
     quiet: Quiet = False,
 ) -> None:
-    """Flow, dead zone, wall heat, friction or dead volumes from recordings made for them.
+    """Dead zone, flow, dead volumes, wall heat or friction from recordings made for them.
 
-    Without PROCEDURE: what there is, and the recording that each needs.
+    Without PROCEDURE: what there is, in the order in which it is to be done.  With PROCEDURE
+    alone: what to do and to record for it.
     """
     with answering(quiet) as say:
-        from studies.identification_text import identified_text, known_procedure, procedures_text
+        from studies.identification_text import (
+            guide_text,
+            identified_text,
+            known_procedure,
+            procedures_text,
+        )
 
-        if procedure is None:
-            typer.echo(procedures_text())
+        if procedure is None or rig is None:
+            typer.echo(procedures_text() if procedure is None else guide_text(procedure))
             return
         from studies.documents import identification_document
         from workbench.errors import InputError, Message
@@ -56,21 +68,24 @@ def identify(
         from workbench.rig_writing import write_rig
 
         chosen = known_procedure(procedure, tank)
-        if rig is None or not recordings:
-            raise InputError(Message("needs a rig and recordings", procedure, chosen.manoeuvre))
+        if not recordings:
+            raise InputError(Message("needs recordings", procedure, chosen.manoeuvre))
+        if into and not output:
+            raise InputError(Message("writes nothing without -o", "--into", "-o FILE"))
         writable(output, json, folders=[figures])
-        known = load_rig(rig)
+        known, other = load_rig(rig), load_rig(into) if into else None
         read = read_all(known, recordings, say)
         say(f"identifying {chosen.gives}")
         found = chosen.run(known, read)
-        write_json(json, identification_document(chosen.name, found))
+        better = found.improved(other, chosen.note(found, read)) if output else known
+        write_json(json, identification_document(chosen, found))
         if figures:
             from studies.figures.identification import identification_figures
             from studies.figures.style import save_all
 
             save_all(identification_figures(found), figures, command_text())
             say(f"figures in {figures}")
-        typer.echo(identified_text(found))
+        typer.echo(identified_text(chosen, found))
         if output:
-            write_rig(found.improved(), output)
+            write_rig(better, output)
             typer.echo(f"wrote {output}")

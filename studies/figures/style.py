@@ -127,10 +127,10 @@ def _curves(axes: Axes) -> Iterator[tuple[str, list, list]]:
         if not hasattr(bars, "patches"):
             continue
         flat = getattr(bars, "orientation", "vertical") == "horizontal"
-        ticks = (axes.get_yticks(), axes.get_yticklabels()) if flat else (
-            axes.get_xticks(), axes.get_xticklabels()
-        )  # fmt: skip
-        words = {round(float(at), 6): label.get_text() for at, label in zip(*ticks, strict=True)}
+        axis = axes.yaxis if flat else axes.xaxis
+        ticks = axis.get_ticklocs()
+        labels = axis.get_major_formatter().format_ticks(ticks)  # also where a panel hides them
+        words = {round(float(at), 6): label for at, label in zip(ticks, labels, strict=True)}
         sizes = [p.get_width() if flat else p.get_height() for p in bars.patches]
         middles = [
             p.get_y() + p.get_height() / 2 if flat else p.get_x() + p.get_width() / 2

@@ -147,9 +147,15 @@ def static_map(tank: Tank, seed: int, amplitude_v: float = 1.2, period_s: float 
 
 
 def pushed_piston(
-    drive: d.Drive, from_m: float, to_m: float, seed: int, leak_m2: float = 2e-10
+    drive: d.Drive,
+    from_m: float,
+    to_m: float,
+    seed: int,
+    start_pa: float | None = None,
+    leak_m2: float = 2e-10,
 ) -> Table:
-    """Chamber a plugged at ambient pressure, the piston pushed in 0.15 s and held; 5 s, 1 kHz."""
+    """Chamber a plugged, by default at ambient, the piston moved in 0.15 s and held; 5 s, 1 kHz."""
+    start_pa = drive.ambient_pressure_pa if start_pa is None else start_pa
     step_s, samples, begins_s, lasts_s = 1e-3, 5000, 0.3, 0.15
 
     def position(t):
@@ -171,7 +177,7 @@ def pushed_piston(
         return passed(-leak_m2, LEAK, (pressure, temperature), outside)
 
     network = Network(volumes, flows, drive.heat_transfer_w_m2_k)
-    true_pa = run(network, np.full((1, 1), drive.ambient_pressure_pa), samples, step_s)[:, 0, 0]
+    true_pa = run(network, np.full((1, 1), start_pa), samples, step_s)[:, 0, 0]
     rng, time_s = np.random.default_rng(seed), step_s * np.arange(samples)
     return dict(
         time_s=time_s,
@@ -190,18 +196,27 @@ def constant_commands(
     A command above the centre starts at 10 mm with chamber pressures that balance, one below it at
     280 mm.
     """
-    command_v = np.round(command_v / COMMAND_STEP_V) * COMMAND_STEP_V
-    n, samples = len(command_v), round(length_s / 1e-3)
-    drive = replace(drive, pressure_lag_s=PRESSURE_LAG_S)
-    batch = stack([drive] * n)
+    samples = round(length_s / 1e-3)
     start_m = np.where(command_v > drive.dead_zone_centre_v, 0.010, 0.280)
+    return commanded(
+        drive, np.broadcast_to(command_v, (samples, len(command_v))), start_m, seed, substeps
+    )
+
+
+def commanded(
+    drive: d.Drive, command_v: np.ndarray, start_m, seed: int, substeps: int = 50
+) -> list[Table]:
+    """The drive under commands (n_samples, n_columns), from rest at these places, 1 kHz."""
+    command_v = np.round(command_v / COMMAND_STEP_V) * COMMAND_STEP_V
+    samples, n = command_v.shape
+    batch = stack([replace(drive, pressure_lag_s=PRESSURE_LAG_S)] * n)
     state = d.at_rest(batch, start_m, 0.8 * drive.supply_pressure_pa)
-    out = open_loop(batch, np.broadcast_to(command_v, (samples, n)), state, substeps)
+    out = open_loop(batch, command_v, state, substeps)
     rng = np.random.default_rng(seed)
     return [
         dict(
             time_s=1e-3 * np.arange(samples),
-            command_v=np.full(samples, command_v[k]),
+            command_v=command_v[:, k],
             position_m=_read(out["position_m"][:, k], POSITION_NOISE_M, POSITION_STEP_M, rng),
             pressure_a_pa=_pressure(out["pressure_a_pa"][:, k], rng),
             pressure_b_pa=_pressure(out["pressure_b_pa"][:, k], rng),
@@ -217,8 +232,9 @@ def reservoir_release(
     seed: int,
     tank: Tank | None = None,
     leak_m2: float = 1e-9,
+    start_pa: float | None = None,
 ) -> Table:
-    """The full tank let into a locked chamber at ambient pressure after 1 s; 40 s at 100 Hz.
+    """The full tank let into a locked chamber, by default at ambient, after 1 s; 40 s at 100 Hz.
 
     The tank stands where the supply was, so its pressure is the supply's channel.  A seal leaks.
     """
@@ -237,8 +253,9 @@ def reservoir_release(
         return np.stack([-over, over - lost]), np.stack([-carried, carried - taken])
 
     network = Network(constant_volumes(volume, surface), flows, drive.heat_transfer_w_m2_k)
-    start_pa = np.array([[tank.supply_pa], [drive.ambient_pressure_pa]])
-    true_pa = run(network, start_pa, samples, step_s, substeps=2)[:, :, 0]
+    chamber_pa = drive.ambient_pressure_pa if start_pa is None else start_pa
+    first_pa = np.array([[tank.supply_pa], [chamber_pa]])
+    true_pa = run(network, first_pa, samples, step_s, substeps=2)[:, :, 0]
     rng = np.random.default_rng(seed)
     filled, other = _pressure(true_pa[:, 1], rng), np.full(samples, drive.ambient_pressure_pa)
     pressures = (filled, _pressure(other, rng))

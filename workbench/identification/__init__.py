@@ -10,5 +10,6 @@ from workbench.identification import dead_volume, dead_zone, friction, tank_curv
 
 PROCEDURES = {
     each.PROCEDURE.name: each.PROCEDURE
-    for each in (tank_curves, dead_zone, wall_heat, friction, dead_volume)
+    for each in (dead_zone, tank_curves, dead_volume, wall_heat, friction)
 }
+"""In the order in which they are to be done: what a later one needs, an earlier one finds."""

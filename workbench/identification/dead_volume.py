@@ -176,8 +176,13 @@ def _curve(recording: Recording, release: Release) -> Curve:
 PROCEDURE = Procedure(
     name="dead-volume",
     gives="total and dead volume of each chamber",
-    manoeuvre="a full tank of known volume in place of the supply, let into one locked chamber "
-    "that has been at ambient; log both pressures for 1 s before and 30 s after",
+    manoeuvre="piston locked at the far end of the chamber's stroke, a full tank of known volume "
+    "(--tank) in place of the supply: let it into the chamber 1 s after the start and leave it "
+    "open for 30 s; one recording for each chamber",
+    channels="valve.command, slide.position, the pressure of the chamber, and that of the tank as "
+    "supply.pressure, at 50 Hz or more",
+    example="dead-volume drive.toml release_a.csv release_b.csv --tank '0.344 l' -o drive2.toml",
     source="paper 002 Eqs. 22, 23, Fig. 15, Table 6 (S002-7, E002-9)",
+    printed={"chamber_a.total_volume_m3": 1.734e-4, "chamber_b.total_volume_m3": 1.976e-4},
     run=dead_volume,
 )

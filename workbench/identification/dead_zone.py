@@ -19,14 +19,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from workbench.effects import DeadZone, FivePortValve
-from workbench.errors import InputError, Message
 from workbench.fitting.noise import measured_noise
 from workbench.fitting.starts import guessed_states
 from workbench.identification.least_squares import Solution, Unknown, solve
 from workbench.identification.result import Curve, Identified, Procedure, complete, estimated, unfit
 from workbench.identification.runs import outputs_under
-from workbench.parts import Body
+from workbench.identification.tank import TankOnValve, rests_at, steady_supply, tank_on_valve
 from workbench.plant import Plant
 from workbench.recording import Recording
 from workbench.rig import Rig
@@ -53,14 +51,14 @@ def dead_zone(rig: Rig, recordings: Sequence[Recording]) -> DeadZoneLimits:
         If the plant is no tank behind a valve, or a recording no slow sweep through both limits.
     """
     complete(recordings)
-    plant = rig.fit_for(recordings[0]).lean(keep=[_zone(rig.plant).name])
-    zone, valve = _zone(plant), _valve(plant)
+    tank = tank_on_valve(rig, recordings[0])
+    plant = tank.plant
     for each in recordings:
-        _check_sweep(plant, each)
+        _check_sweep(tank, each)
     noise = measured_noise(recordings, plant.measured)[plant.measured[0]]
     pieces = [piece for each in recordings for piece in each.pieces]
-    names = [f"{zone.name}.centre_v", f"{zone.name}.half_width_v"]
-    names += [f"{valve.name}.{k}" for k in ("leak_area_m2", "supply_fraction", "exhaust_fraction")]
+    names = [f"{tank.zone}.centre_v", f"{tank.zone}.half_width_v"]
+    names += [f"{tank.valve}.{k}" for k in ("leak_area_m2", "supply_fraction", "exhaust_fraction")]
     found = _fitted(plant, pieces, names, noise)
     centre_v, half_v = found.values[:2]
     shares = np.array([[1.0, -1.0], [1.0, 1.0]])
@@ -108,37 +106,33 @@ def _curves(plant: Plant, pieces: list[Recording], residuals: np.ndarray) -> lis
     ]
 
 
-def _zone(plant: Plant) -> DeadZone:
-    found = [effect for effect in plant.effects if isinstance(effect, DeadZone)]
-    if not found or any(isinstance(part, Body) for part in plant.parts):
-        what = "is no tank behind a valve with a dead zone"
-        raise InputError(Message(what, plant.name, "a rig of servo_reservoir"))
-    return found[0]
-
-
-def _valve(plant: Plant) -> FivePortValve:
-    return next(effect for effect in plant.effects if isinstance(effect, FivePortValve))
-
-
-def _check_sweep(plant: Plant, recording: Recording) -> None:
+def _check_sweep(tank: TankOnValve, recording: Recording) -> None:
+    plant = tank.plant
     command, pressure = recording[plant.commands[0].name], recording[plant.measured[0]]
-    ends_pa = plant.values["supply.pressure_pa"], plant.values["atmosphere.pressure_pa"]
-    moved_pa = float(np.nanmax(pressure) - np.nanmin(pressure))
+    steady_supply(recording)
+    low_pa, high_pa = float(np.min(pressure)), float(np.max(pressure))
     expected = "a slow sweep of the command through both limits, which fills and empties the tank"
-    if moved_pa < REACHED * (ends_pa[0] - ends_pa[1]):
-        what = f"is no map of the dead zone: the pressure moves by {moved_pa / 1e5:.2g} bar only"
-        raise unfit(recording, what, expected)
+    if high_pa - low_pa < REACHED * tank.span_pa(recording):
+        what = "is no map of the dead zone: the pressure moves by"
+        raise unfit(recording, f"{what} {(high_pa - low_pa) / 1e5:.2g} bar only", expected)
     smooth = np.convolve(command, np.ones(25) / 25, mode="valid")
     fastest_v_s = float(np.max(np.abs(np.diff(smooth)))) / recording.sample_time_s
     if fastest_v_s > FASTEST_V_S:
         what = f"is no map of the dead zone: the command moves at {fastest_v_s:.3g} V/s"
         raise unfit(recording, what, f"{expected}, below {FASTEST_V_S:g} V/s")
+    rests_at(tank, recording, high_pa, charged=True)
+    rests_at(tank, recording, low_pa, charged=False)
 
 
 PROCEDURE = Procedure(
     name="dead-zone",
     gives="limits of the dead zone, leak of the closed spool",
-    manoeuvre="valve on a closed tank, slow sine of the command (20 s) of 1.2 V about its centre",
+    manoeuvre="valve on a closed tank, from ambient: two periods of a slow sine of the command "
+    "(20 s), 1.2 V about its centre, so that the tank fills and empties once in each",
+    channels="valve.command and reservoir.pressure at 100 Hz or more; supply.pressure where the "
+    "supply is not constant",
+    example="dead-zone tank.toml map.csv -o tank2.toml --figures figures",
     source="paper 002 Fig. 11, Table 3 (S002-2)",
+    printed={"lower_limit_v": 4.53, "upper_limit_v": 5.37},
     run=dead_zone,
 )

@@ -278,6 +278,16 @@ PROCEDURE = Procedure(
     gives="Coulomb, static and viscous friction by direction, bristle",
     manoeuvre="one constant command per recording, both directions: several that slide at constant "
     "speed over the stroke, and some just outside the dead zone that stick and slip",
+    channels="valve.command, slide.position and both pressures at 500 Hz or more",
+    example="friction drive3.toml run_*.csv stick_*.csv -o drive4.toml --figures figures",
     source="paper 002 Figs. 13, 14, Table 5 (S002-4, S002-5, S002-6)",
+    printed={
+        "static_forward_n": 50.97,
+        "coulomb_forward_n": 28.35,
+        "viscous_forward_n_s_m": 46.01,
+        "static_backward_n": 46.15,
+        "coulomb_backward_n": 26.22,
+        "viscous_backward_n_s_m": 42.18,
+    },
     run=friction,
 )

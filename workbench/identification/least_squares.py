@@ -93,6 +93,8 @@ def solve(
     rows, priors = found.jac[: len(left)], np.diag((known * scale / noise) ** 2)
     information = rows.T @ rows / size + priors
     covariance = np.linalg.pinv(information) * np.outer(scale, scale)
+    unseen = np.diag(information) == 0.0  # what no residual depends on is not known at all
+    covariance[unseen, unseen] = np.inf
     return Solution(start + scale * found.x, covariance, left)
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from math import isfinite
 
 import numpy as np
 
-from workbench.errors import InputError, Message
+from workbench.errors import InputError, Message, listed
 from workbench.recording import Recording
 from workbench.rig import Rig
 from workbench.units import public_name
@@ -65,12 +65,15 @@ class Identified:
         Values of the rig's own parameters, by full name.
     curves
         Measured and fitted, with the residuals.
+    carried
+        What an earlier procedure found and these values rely on: it goes along into another rig.
     """
 
     rig: Rig
     estimates: tuple[Estimate, ...]
     parameters: tuple[Estimate, ...]
     curves: tuple[Curve, ...]
+    carried: tuple[Estimate, ...] = ()
 
     def __getitem__(self, name: str) -> Estimate:
         found = {each.name: each for each in (*self.estimates, *self.parameters)}
@@ -78,41 +81,107 @@ class Identified:
             raise KeyError(f"no {name} was identified; there are {', '.join(found)}")
         return found[name]
 
-    def improved(self) -> Rig:
+    def improved(self, into: Rig | None = None, note: str = "") -> Rig:
         """The rig with what was found, and its standard deviations; the rest stays.
 
-        A value beyond the range of its parameter is taken at the end of the range.  A cause that
-        the rig file removed is back where its strength was identified.
+        ``into`` is another rig that has parameters of the same names, such as the drive whose valve
+        was measured on a tank.  A parameter that a rig fixes keeps its value.  A value beyond the
+        range of its parameter is taken at the end of the range.  A cause that the rig file removed
+        is back where its strength was identified.
+
+        Raises
+        ------
+        InputError
+            If the other rig has none of the parameters.
         """
-        plant = self.rig.plant
-        known = plant.parameters
+        rig = self.rig if into is None else into
+        known = rig.plant.parameters
+        every = (*self.parameters, *(self.carried if into else ()))
+        taken = [e for e in every if e.name in known and e.name not in rig.fixed]
+        if not taken:
+            names = listed(public_name(each.name) for each in self.parameters)
+            raise InputError(Message("takes none of what was identified", rig.name, names))
         values = {
-            each.name: min(max(each.value, known[each.name].lower), known[each.name].upper)
-            for each in self.parameters
+            e.name: min(max(e.value, known[e.name].lower), known[e.name].upper) for e in taken
         }
-        deviations = {e.name: e.deviation for e in self.parameters if isfinite(e.deviation)}
-        strengths = {name: c.strength for name, c in plant.candidates.items()}
+        deviations = {e.name: e.deviation for e in taken if isfinite(e.deviation)}
+        strengths = {name: c.strength for name, c in rig.plant.candidates.items()}
         return replace(
-            self.rig,
-            plant=plant.with_values(values),
-            removed=tuple(name for name in self.rig.removed if strengths[name] not in values),
-            deviations={**self.rig.deviations, **deviations},
+            rig,
+            plant=rig.plant.with_values(values),
+            removed=tuple(name for name in rig.removed if strengths[name] not in values),
+            deviations={**rig.deviations, **deviations},
+            notes=_with_notes(rig.notes, *(self._earlier if into else ()), note),
         )
+
+    @property
+    def _earlier(self) -> list[str]:
+        """What the rig says of where the carried values come from."""
+        names = [public_name(each.name) for each in self.carried]
+        return [note for note in self.rig.notes if any(name in note for name in names)]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Procedure:
     """A guided fit: what it gives, the recording it needs, and the function that does it.
 
-    The function takes a rig and its recordings, and raises InputError where a recording is of
-    another kind.
+    Attributes
+    ----------
+    manoeuvre, channels
+        What to do, and what to record of it.
+    first
+        The procedure whose result must stand in the rig beforehand; none where empty.
+    example
+        The command, behind ``workbench identify``.
+    printed
+        What paper 002 prints of its own drive, in SI by the name of an estimate or a parameter.
+    run
+        (rig, recordings) -> what was found; raises InputError where a recording is of another
+        kind, or what must be known before is not.
     """
 
     name: str
     gives: str
     manoeuvre: str
+    channels: str
+    first: str = ""
+    example: str
     source: str
+    printed: Mapping[str, float] = field(default_factory=dict)
     run: Callable[[Rig, Sequence[Recording]], Identified]
+
+    def note(self, found: Identified, recordings: Sequence[Recording]) -> str:
+        """One line for the rig file: which values, from which recordings, by which method."""
+        names = listed(public_name(each.name) for each in found.parameters)
+        read = listed((each.name for each in recordings), most=3)
+        return f"{self.name} identified {names} from {read}; {self.source}"
+
+
+def _with_notes(notes: tuple[str, ...], *new: str) -> tuple[str, ...]:
+    """The notes and new ones, each in place of what the same procedure said before."""
+    for note in filter(None, new):
+        begins = " ".join(note.split()[:2])
+        notes = (*(each for each in notes if not each.startswith(begins)), note)
+    return notes
+
+
+def known_before(rig: Rig, names: Iterable[str], first: str, why: str) -> None:
+    """Refuse a rig that does not say how well an earlier result is known.
+
+    A rig says so by a standard deviation of its own, or by fixing the parameter.
+
+    Raises
+    ------
+    InputError
+        With the parameters, and the procedure that finds them.
+    """
+    missing = [public_name(n) for n in names if n not in rig.deviations and n not in rig.fixed]
+    if missing:
+        what = f"{why}, and the rig does not say how well it knows {listed(missing)}"
+        expected = (
+            f"the rig that `workbench identify {first}` writes with -o, or these in [uncertainty]"
+        )
+        raise InputError(Message(what, rig.name, expected))
 
 
 def complete(recordings: Iterable[Recording]) -> None:

@@ -6,10 +6,11 @@ of the wall, and its pressure with it:
     p(t) = p_f + dp exp(-t / tau),    k = m c_v / tau,    lambda_0 = lambda(k) at (p_f, T_w)
 
 tau is that of the exponential; conductance and coefficient of this chain are read from the
-plant's own heat law linearised at the end of the decay.  The chain makes the coefficient too large,
-more so for a long push, because the decay is no exponential (E002-15): the coefficient grows with
-sqrt(p T).  So the coefficient of the rig is fitted to the pressure itself, with the gas temperature
-at the stop and a leak as unknowns; the time constant that it gives at rest is told too.
+plant's own heat law linearised at the end of the decay.  The chain makes the coefficient too large
+after a push and too small after a pull, more so for a long one, because the decay is no exponential
+(E002-15): the coefficient grows with sqrt(p T).  So the coefficient of the rig is fitted to the
+pressure itself, with the gas temperature at the stop and a leak as unknowns; the time constant that
+it gives at rest is told too.
 
 Source: paper 002 Eqs. 16 to 19, Fig. 12, Table 4; physics.md 5, row S002-3.
 """
@@ -40,6 +41,7 @@ from workbench.identification.result import (
     Procedure,
     complete,
     estimated,
+    known_before,
     unfit,
 )
 from workbench.identification.runs import outputs_under
@@ -77,11 +79,13 @@ def wall_heat(rig: Rig, recordings: Sequence[Recording]) -> WallHeatFit:
     Raises
     ------
     InputError
-        If a recording holds no decay after a push, or one too short or too small.
+        If a recording holds no decay after a push, or one too short or too small, or the dead
+        volume of its chamber is not known.
     """
     complete(recordings)
     plant = rig.fit_for(recordings[0])
     decays = [_decay(plant, each) for each in recordings]
+    _check_volumes(rig, decays)
     tops = [_exponential(each) for each in decays]
     name = _coefficient(decays[0].vessel)
     fits = [_fitted(each, name) for each in decays]
@@ -93,6 +97,13 @@ def wall_heat(rig: Rig, recordings: Sequence[Recording]) -> WallHeatFit:
         curves=tuple(c for rows in zip(decays, tops, fits, strict=True) for c in _curves(*rows)),
         chamber=decays[0].channel.partition(".")[0],
     )
+
+
+def _check_volumes(rig: Rig, decays: Sequence[_Decay]) -> None:
+    """The gas that cools is that of the whole volume; a vessel's is the rig's own."""
+    dead = {f"{each.channel.partition('.')[0]}.dead_volume_m3" for each in decays}
+    why = "the gas that cools is that of the whole volume"
+    known_before(rig, sorted(dead & set(rig.plant.values)), "dead-volume", why)
 
 
 def _decay(plant: Plant, recording: Recording) -> _Decay:
@@ -235,8 +246,19 @@ def _together(found: list[Estimate]) -> Estimate:
 PROCEDURE = Procedure(
     name="wall-heat",
     gives="thermal time constant, heat coefficient of the wall",
-    manoeuvre="ports of one chamber plugged, piston pushed by a third of the stroke in 0.2 s "
-    "and held for 5 s",
+    manoeuvre="ports of one chamber plugged, piston pushed or pulled by a third of the stroke in "
+    "0.2 s and held for 5 s; several such recordings count together, and the time constant told is "
+    "that of the first",
+    channels="valve.command, slide.position and the pressure of the chamber at 500 Hz or more",
+    first="dead-volume",
+    example="wall-heat drive2.toml push_1.csv push_2.csv -o drive3.toml --figures figures",
     source="paper 002 Eqs. 16 to 19, Fig. 12, Table 4 (S002-3)",
+    printed={
+        "time_constant_s": 0.662,
+        "conductance_w_k": 0.221,
+        "chain_coefficient_w_m2_k": 22.563,
+        "rest_time_constant_s": 0.662,
+        "wall_heat.coefficient_w_m2_k": 22.563,
+    },
     run=wall_heat,
 )
