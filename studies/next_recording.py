@@ -36,11 +36,22 @@ class Separation:
 
     @property
     def broken(self) -> bool:
-        """The hidden effect is named alone."""
+        """The hidden effect leads, and of the rivals that asked for the recording none is left.
+
+        A new one may stand beside it: a longer stroke shows more of what always is there.
+        """
         leader = self.after.ranking[0] if self.after else None
         name = SERVO_DRIVE.public_name(self.case)
-        return bool(leader and leader.accepted and not leader.tied_with
-                    and leader.candidate.name == name)  # fmt: skip
+        if leader is None or not leader.accepted or leader.candidate.name != name:
+            return False
+        asked = {self.before.ranking[0].candidate.name, *_alike(self.before)} - {name}
+        return not asked & set(_alike(self.after))
+
+
+def _alike(found: Diagnosis | None) -> tuple[str, ...]:
+    """What the leader of a ranking is not told from."""
+    leader = found.ranking[0] if found and found.ranking else None
+    return (*leader.tied_with, *leader.crowd) if leader else ()
 
 
 def recorded(case: Case, asked: NextRecording) -> Recording:
