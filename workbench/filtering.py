@@ -141,9 +141,12 @@ def filter_pass(
     return _joined(found, [_run(found, piece, start) for piece, start in pairs])
 
 
-def smooth(found: PlantFilter, recording: Recording) -> FilterResult:
-    """:func:`filter_pass` and back again: every estimate knows the whole recording."""
-    return _joined(found, [_smoothed(_run(found, piece)) for piece in recording.pieces])
+def smooth(found: PlantFilter, recording: Recording, factor: float = 1.0) -> FilterResult:
+    """:func:`filter_pass` and back again: every estimate knows the whole recording.
+
+    ``factor`` multiplies the intensities of the unknown inputs.
+    """
+    return _joined(found, [_smoothed(_run(found, p, factor=factor)) for p in recording.pieces])
 
 
 def log_likelihoods(found: PlantFilter, recording: Recording, factors: np.ndarray) -> np.ndarray:
@@ -152,12 +155,9 @@ def log_likelihoods(found: PlantFilter, recording: Recording, factors: np.ndarra
     ``factors`` (n_w, n) multiply the intensities of ``found``; 0 switches an input off.  Returns
     shape (n,), not finite where a run was lost.
     """
-    n_w, n = factors.shape
-    sizes = np.vstack([np.ones((len(found.scale) - n_w, n)), factors]).T
-    P, Q = (
-        np.array([(covariance * np.outer(size, size)).ravel() for size in sizes]).T
-        for covariance in (found.start_covariance, found.step_covariance)
-    )
+    n = factors.shape[1]
+    pairs = zip(*(_covariances(found, column) for column in factors.T), strict=True)
+    P, Q = (np.array([each.ravel() for each in several]).T for several in pairs)
     total = np.zeros((1, n))
     for piece in recording.pieces:
         start, columns = _posed(found, piece)
@@ -238,14 +238,23 @@ def _posed(found: PlantFilter, piece: Recording) -> tuple[np.ndarray, tuple[np.n
     return start, (u, d, values, np.where(received, y, 0.0), received)
 
 
-def _run(found: PlantFilter, piece: Recording, guessed: np.ndarray | None = None) -> _Pass:
+def _covariances(found: PlantFilter, factors: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Start and step covariance with the intensities of the unknown inputs times (n_w,)."""
+    size = np.pad(factors, (len(found.scale) - len(factors), 0), constant_values=1.0)
+    return tuple(np.outer(size, size) * c for c in (found.start_covariance, found.step_covariance))
+
+
+def _run(
+    found: PlantFilter, piece: Recording, guessed: np.ndarray | None = None, factor: float = 1.0
+) -> _Pass:
     """The filter over one gap-free piece, from a guessed state, (n_x,), where there is one."""
     start, columns = _posed(found, piece)
+    P0, Q = _covariances(found, np.full(len(found.unknown_inputs), factor))
     if guessed is not None:
         start[: len(guessed)] = guessed / found.plant.scale
     received = columns[-1]
     many = found.sample.mapaccum("filter", received.shape[1], 2)
-    results = many(start, found.start_covariance, *columns, found.step_covariance)
+    results = many(start, P0, *columns, Q)
     _, _, F, X, P, e, deviation, likely, said, weights, left = (v.full() for v in results)
     return _Pass(
         X=X.T,
