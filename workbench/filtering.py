@@ -142,18 +142,14 @@ def filter_pass(
 
 
 def smooth(found: PlantFilter, recording: Recording, factor: float = 1.0) -> FilterResult:
-    """:func:`filter_pass` and back again: every estimate knows the whole recording.
-
-    ``factor`` multiplies the intensities of the unknown inputs.
-    """
+    """:func:`filter_pass` and back again, with the unknown inputs' intensities times a factor."""
     return _joined(found, [_smoothed(_run(found, p, factor=factor)) for p in recording.pieces])
 
 
 def log_likelihoods(found: PlantFilter, recording: Recording, factors: np.ndarray) -> np.ndarray:
-    """Log-likelihood of a recording at several intensities of the unknown inputs, side by side.
+    """Log-likelihoods, (n,), at several intensities of the unknown inputs, side by side.
 
-    ``factors`` (n_w, n) multiply the intensities of ``found``; 0 switches an input off.  Returns
-    shape (n,), not finite where a run was lost.
+    ``factors`` (n_w, n) multiply those of ``found``; 0 is none.  Not finite where a run was lost.
     """
     n = factors.shape[1]
     pairs = zip(*(_covariances(found, column) for column in factors.T), strict=True)

@@ -155,5 +155,6 @@ def _draw_loop(axes: Axes, loop: Loop, per: float, factor: float) -> None:
     for way, (marks, colour), (centres, means) in zip(ways, styles, loop.branches, strict=True):
         label = f"{by} {way}"
         axes.plot(per * centres, factor * means, marks, color=colour, markersize=2.5, label=label)
-    axes.margins(y=0.3)  # room for the legend
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high + 0.5 * (high - low))  # room for the legend
     axes.legend(loc="upper left")

@@ -30,7 +30,7 @@ from workbench.candidate import Candidate
 from workbench.diagnosis.blind_starts import blind_starts, freed
 from workbench.effect import Parameter
 from workbench.fitting.linearised import Linearised, Normal, Point, linearise, normal_equations
-from workbench.fitting.problem import staged, stateless
+from workbench.fitting.problem import Problem, staged, stateless
 from workbench.fitting.start_states import carried
 from workbench.fitting.unknowns import Unknowns
 from workbench.fitting.windows import Windows
@@ -211,6 +211,23 @@ def scan(
         sizes = [_typical_sizes(known[c.strength], change[c.strength]) for c, change in trials]
         profiles += _profiles(metric, trials, sizes, rows, of_all)
     return sorted(profiles, key=lambda profile: -profile.drop)
+
+
+def scan_catalogue(problem: Problem) -> list[Profile]:
+    """Profiles of the causes that are not there and not shifts of fitted parameters."""
+    base = problem.base
+    values = base.plant.values
+    known = problem.whole.parameters
+    absent = [
+        c
+        for c in problem.whole.candidates.values()
+        if c.held is None and c.strength not in problem.rig.fixed
+        and c not in problem.added and base.windows.plant.ready_for(c)
+        and (c.cause.tolerated or values.get(c.strength, known[c.strength].null)
+             == known[c.strength].null)
+    ]  # fmt: skip
+    at = problem.linearised
+    return scan(problem.whole, base.windows, base.unknowns, base.point, absent, at)
 
 
 def sizes_to_try(plant: Plant, candidate: Candidate) -> list[dict[str, float]]:
