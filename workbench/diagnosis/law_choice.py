@@ -24,7 +24,7 @@ import numpy as np
 
 from workbench.candidate import Candidate
 from workbench.diagnosis.blind_starts import blind_starts
-from workbench.diagnosis.judge import CLOSE_DROP
+from workbench.diagnosis.judge import CLOSE_DROP, SAME_DIRECTION
 from workbench.diagnosis.scan import Metric, Profile, every_second
 from workbench.effect import Parameter
 from workbench.fitting.problem import Problem, staged
@@ -34,7 +34,6 @@ SECANT = 0.3  # of the typical size
 HALVES = 40
 NEARLY = 1.0 - CLOSE_DROP  # of the most that a term gains on the same windows
 STABLE = 0.7  # of the halves: what one window alone asks for is in half of them
-SAME = 0.95  # cosine of what a term and an effect do, from which on they are one
 SEED = 1
 
 
@@ -123,7 +122,9 @@ def _has_a_name(problem: Problem, signature: np.ndarray, known: Iterable[Profile
     for each in known:
         cosine = float(signature @ each.signature) / size
         signed = problem.whole.parameters[each.candidate.strength].signed
-        if (abs(cosine) if signed else cosine) > SAME * float(np.linalg.norm(each.signature)):
+        if (abs(cosine) if signed else cosine) > SAME_DIRECTION * float(
+            np.linalg.norm(each.signature)
+        ):
             return True
     return False
 
