@@ -29,7 +29,7 @@ from workbench.rig_laws import is_law, law_terms, laws_of, with_laws
 
 MOST_TERMS = 3
 LEAST_TERM_SHARE = 0.10  # of the misfit that another term must take
-LEAST_PROMISE = 0.03  # of the misfit: what a secant promises less than is not followed
+LEAST_PROMISE = 0.03  # of the misfit, of the secant of a term on top of others
 
 
 def empirical_law(problem: Problem, known: Sequence[Profile], to_beat: float = 0.0) -> Law | None:
@@ -47,7 +47,7 @@ def empirical_law(problem: Problem, known: Sequence[Profile], to_beat: float = 0
     for _ in range(MOST_TERMS):
         # What has a name at the base has none to offer on top of a term that imitates it either.
         terms = [term for term in terms if term not in problem.added]
-        least = LEAST_PROMISE * first.misfit
+        least = LEAST_PROMISE * first.misfit if steps else 0.0
         chosen, terms = worth_scanning(problem, terms, () if steps else known, least)
         found = _refitted(problem, chosen, 0.0 if steps else to_beat)
         if not found or found.drop_train * misfit(problem.base) < LEAST_TERM_SHARE * first.misfit:
