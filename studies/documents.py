@@ -177,6 +177,7 @@ def _ranked(row: Ranked) -> Document:
 
 
 def _where(where: Where) -> Document:
+    walk = where.intensities
     return {
         "balance": where.balance,
         "by_balance": {name: plain(gain) for name, gain in where.by_balance.items()},
@@ -184,6 +185,25 @@ def _where(where: Where) -> Document:
             {"variable": public_name(each.variable), "explains": plain(each.explains)}
             for each in where.against
         ],
+        "loops": [
+            {
+                "variable": public_name(each.variable),
+                "by": public_name(loop.by),
+                "adds": plain(loop.adds),
+            }
+            for each in where.against
+            for loop in each.loops
+        ],
+        "memory": where.memory is not None,
+        "imitated_by_parameters": plain(where.imitated),
+        "random_walk": {
+            "term": public_name(where.term_name),
+            "likeliest": plain(walk.likeliest),
+            "neighbour": plain(walk.neighbour),
+            "unit": f"{si_unit(where.term_name)}/s^0.5",
+        }
+        if walk
+        else None,
         "by_regime": [
             {"regime": name, "share_of_error": plain(share)}
             for name, share in where.by_regime.items()

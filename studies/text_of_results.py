@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from workbench.diagnosis.addition import Addition
+    from workbench.diagnosis.missing_term import Dependence, Loop
     from workbench.diagnosis.result import Diagnosis, Law, NextRecording, Ranked
     from workbench.fitting.errors import SignalError
     from workbench.fitting.fit import FitReport
@@ -135,9 +136,19 @@ def where_text(found: Diagnosis) -> str:
         f"missing term of {where.balance} follows "
         + ", ".join(f"{public_name(d.variable)} {percent(d.explains)}" for d in where.against[:3])
     )
+    lines += [] if where.memory is None else [_memory_text(*where.memory)]
     shares = list(where.by_regime.items())[:4]
     lines.append("error in: " + ", ".join(f"{name} {percent(share)}" for name, share in shares))
     return "\n".join(lines)
+
+
+def _memory_text(followed: Dependence, loop: Loop) -> str:
+    """A loop in words: what it runs over, what turns it, and how wide it is."""
+    return (
+        f"it runs through a loop over {public_name(followed.variable)}, another "
+        f"{percent(loop.adds)} by the direction of {public_name(loop.by)}: memory, such as "
+        "hysteresis, lag, presliding or heat"
+    )
 
 
 def before_after_text(before: Errors, after: Errors, unit_of: Mapping[str, str]) -> str:

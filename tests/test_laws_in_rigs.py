@@ -23,7 +23,8 @@ from workbench.diagnosis.improvement import Change
 from workbench.diagnosis.result import Verdict
 from workbench.errors import InputError
 from workbench.fitting.fit import fit
-from workbench.parts import Supply
+from workbench.parts import Atmosphere, Supply
+from workbench.plant import Plant
 from workbench.plants import closed_chamber
 from workbench.reading.writer import write_recording
 from workbench.recording import Recording
@@ -145,6 +146,7 @@ def test_every_term_of_every_plant_acts_and_is_absent_at_null(plant):
     lawful = plant.with_effects(*terms.values())
     x = plant.initial + plant.scale * np.random.default_rng(5).uniform(0.1, 0.5, len(plant.scale))
     u, d, p = plant.nominal
+    u = u + 1.0  # a command of its nominal value is none, nor one in a dead zone
 
     def rates_and_outputs(values):
         with_them = lawful.with_values(values).nominal[2]
@@ -168,6 +170,18 @@ def test_a_term_over_the_supply_reads_it_by_its_own_name():
 
     assert name not in law_terms(plant)
     assert lawful.model.f(lawful.initial, u, d, p)[0].full().any()
+
+
+def test_a_term_over_the_atmosphere_reads_it_by_its_own_name():
+    chamber = next(part for part in closed_chamber().parts if part.name == "chamber")
+    parts = (Atmosphere(name="room"), replace(chamber, initial_pressure_pa=5e5))
+    own = Plant(name="own", parts=parts, measured=("chamber.pressure_pa",))
+    name = "law[p]@chamber"
+    lawful = own.with_effects(law_terms(own)[name]).with_values({f"{name}.size_kg_s": 1e-4})
+    u, d, p = lawful.nominal
+
+    assert lawful.model.f(lawful.initial, u, d, p)[0].full().any()
+    assert name not in law_terms(replace(own, parts=own.parts[1:]))
 
 
 @pytest.mark.parametrize(
@@ -194,7 +208,7 @@ def test_the_command_names_the_terms_there_are(tmp_path):
     rows = "\n".join(f"{1e-3 * k:.3f},4.95" for k in range(400))
     (tmp_path / "train.csv").write_text(f"time,valve.command\ns,V\n{rows}\n")
     words = ("--fit", tmp_path / "train.csv", "-o", tmp_path / "rig2.toml")
-    answer = call("add", tmp_path / "rig.toml", "law[v^2]@slide", *words)
+    answer = call("add", tmp_path / "rig.toml", "law[v^4]@slide", *words)
 
     assert answer.exit_code == 2
     assert "law[v^3]@slide" in answer.stderr

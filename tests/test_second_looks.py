@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from test_diagnosis import bench, coulomb, nothing
 
+from workbench.diagnosis.metric import metric_at
 from workbench.diagnosis.result import Verdict
-from workbench.diagnosis.scan import WIDER, metric_at, scan
+from workbench.diagnosis.scan import WIDER, scan
 from workbench.diagnosis.score import modification_index
 from workbench.diagnosis.verdict import unsteady
 from workbench.fitting.problem import pose

@@ -68,9 +68,12 @@ def filter_pass(
     return _joined(found, [_run(found, piece, start) for piece, start in pairs])
 
 
-def smooth(found: PlantFilter, recording: Recording) -> FilterResult:
-    """:func:`filter_pass` and back again: every estimate knows the whole recording."""
-    return _joined(found, [_smoothed(_run(found, piece)) for piece in recording.pieces])
+def smooth(found: PlantFilter, recording: Recording, factor: float = 1.0) -> FilterResult:
+    """:func:`filter_pass` and back again: every estimate knows the whole recording.
+
+    ``factor`` multiplies the intensities of the unknown inputs.
+    """
+    return _joined(found, [_smoothed(_run(found, p, factor=factor)) for p in recording.pieces])
 
 
 def log_likelihoods(found: PlantFilter, recording: Recording, factors: np.ndarray) -> np.ndarray:
@@ -79,12 +82,9 @@ def log_likelihoods(found: PlantFilter, recording: Recording, factors: np.ndarra
     ``factors`` (n_w, n) multiply the intensities of ``found``; 0 switches an input off.  Returns
     shape (n,), not finite where a run was lost.
     """
-    n_w, n = factors.shape
-    sizes = np.vstack([np.ones((len(found.scale) - n_w, n)), factors]).T
-    P, Q = (
-        np.array([(covariance * np.outer(size, size)).ravel() for size in sizes]).T
-        for covariance in (found.start_covariance, found.step_covariance)
-    )
+    n = factors.shape[1]
+    pairs = zip(*(_covariances(found, column) for column in factors.T), strict=True)
+    P, Q = (np.array([each.ravel() for each in several]).T for several in pairs)
     total = np.zeros((1, n))
     runs = found.likelihood.fold(BLOCK).map(n, "thread", min(n, os.cpu_count() or 1))
     last = found.likelihood.map(n)
@@ -182,13 +182,22 @@ def _posed(found: PlantFilter, piece: Recording) -> tuple[np.ndarray, tuple[np.n
     return start, (u, d, values, np.where(received, y, 0.0), received)
 
 
-def _run(found: PlantFilter, piece: Recording, guessed: np.ndarray | None = None) -> _Pass:
+def _covariances(found: PlantFilter, factors: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Start and step covariance with the intensities of the unknown inputs times (n_w,)."""
+    size = np.pad(factors, (len(found.scale) - len(factors), 0), constant_values=1.0)
+    return tuple(np.outer(size, size) * c for c in (found.start_covariance, found.step_covariance))
+
+
+def _run(
+    found: PlantFilter, piece: Recording, guessed: np.ndarray | None = None, factor: float = 1.0
+) -> _Pass:
     """The filter over one gap-free piece, from a guessed state, (n_x,), where there is one."""
     start, columns = _posed(found, piece)
+    P0, Q = _covariances(found, np.full(len(found.unknown_inputs), factor))
     if guessed is not None:
         start[: len(guessed)] = guessed / found.plant.scale
     received = columns[-1]
-    rows = zip(*_passed(found, start, columns), strict=True)
+    rows = zip(*_passed(found, start, P0, Q, columns), strict=True)
     F, X, P, e, deviation, likely, said, weights, left = map(np.hstack, rows)
     return _Pass(
         X=X.T,
@@ -204,12 +213,15 @@ def _run(found: PlantFilter, piece: Recording, guessed: np.ndarray | None = None
 
 
 def _passed(
-    found: PlantFilter, start: np.ndarray, columns: tuple[np.ndarray, ...]
+    found: PlantFilter,
+    X: np.ndarray,
+    P: np.ndarray,
+    Q: np.ndarray,
+    columns: tuple[np.ndarray, ...],
 ) -> list[tuple[np.ndarray, ...]]:
     """What the filter tells of every sample, block by block: long graphs build slowly."""
     many = found.sample.mapaccum("filter", BLOCK, 2)
-    samples, size = columns[-1].shape[1], len(start)
-    X, P, Q = start, found.start_covariance, np.tile(found.step_covariance, BLOCK)
+    samples, size, Q = columns[-1].shape[1], len(X), np.tile(Q, BLOCK)
     rows = []
     for part in _blocks([_filled(each, samples) for each in columns], slice(0, samples), BLOCK):
         every_X, every_P, *told = called(many, X, P, *part, Q)

@@ -12,7 +12,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from workbench.effects.empirical import EmpiricalForce
-from workbench.fitting.starts import bridged, slope
+from workbench.law_scales import recorded_speed
 from workbench.plant import Plant
 from workbench.recording import Recording
 from workbench.rig import Rig
@@ -46,10 +46,9 @@ def _followed(plant: Plant, recording: Recording) -> dict[str, np.ndarray]:
     wanted = (*plant.measured, *plant.optional_outputs, *driving)
     rows = {n: carried[n] for n in wanted if n in carried and np.isfinite(carried[n]).any()}
     for body in moved:
-        position, speed = f"{body}.position_m", f"{body}.velocity_m_s"
-        if speed not in rows and position in rows:
-            whole = bridged(rows[position], recording.starts)
-            rows[speed] = slope(whole, recording.sample_time_s, recording.starts)
+        values = recorded_speed(recording, body)
+        if values is not None:
+            rows.setdefault(f"{body}.velocity_m_s", values)
     return rows
 
 

@@ -8,6 +8,7 @@ law was fitted to: outside of it nobody knows what it is worth.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from math import inf
 from typing import Any
 
 from workbench.effect import Effect
@@ -17,12 +18,25 @@ from workbench.effects.empirical import (
     EmpiricalFlow,
     EmpiricalForce,
     PressureFlow,
+    ScaledDrag,
+    ScaledFlow,
+    ScaledForce,
     SpeedFlow,
 )
+from workbench.effects.law_features import (
+    COMMANDED_FLOWS,
+    DRAGS,
+    GAUGE_FLOWS,
+    MOVED_FLOWS,
+    PLAIN_FORCES,
+    PRESSED_FORCES,
+    Feature,
+)
+from workbench.effects.law_features import written as written_as
 from workbench.gas_volume import GasVolume
 from workbench.linkage import JointRod
-from workbench.parts import Body, HeldRod, Supply
-from workbench.plant import Plant
+from workbench.parts import Atmosphere, Body, HeldRod, PressureFace, Supply
+from workbench.plant import Plant, Signal
 from workbench.rig_text import RigText, quoted
 from workbench.units import UnitError, public_name, quantity, written
 
@@ -46,18 +60,64 @@ def law_terms(plant: Plant) -> dict[str, Effect]:
 
 
 def _terms(plant: Plant) -> Iterator[Effect]:
-    supplies = [part.name for part in plant.parts if isinstance(part, Supply)]
     for part in plant.parts:
         if isinstance(part, Body | HeldRod | JointRod):
-            yield from (kind(name=_named(kind, part.name), body=part.name) for kind in FORCES)
+            yield from _forces(plant, part.name)
         elif isinstance(part, GasVolume):
-            at = {"chamber": part.name}
-            yield ConstantFlow(name=_named(ConstantFlow, part.name), **at)
-            if supplies:  # of several, the first
-                name = _named(PressureFlow, part.name)
-                yield PressureFlow(name=name, **at, supply=supplies[0])
-            if body := getattr(part, "body", None):
-                yield SpeedFlow(name=_named(SpeedFlow, part.name), **at, body=body)
+            yield from _flows(plant, part)
+
+
+def _forces(plant: Plant, body: str) -> Iterator[Effect]:
+    yield from (kind(name=_named(kind, body), body=body) for kind in FORCES)
+    pushing = tuple(
+        part.name
+        for part in plant.parts
+        if isinstance(part, GasVolume | PressureFace) and getattr(part, "body", None) == body
+    )
+    # Two against each other, or one against the atmosphere; of more, no one says which.
+    across = pushing if len(pushing) > 1 else (*pushing, *_outside(plant))
+    known = len(across) == 2 and bool(pushing)
+    for feature in (*PLAIN_FORCES, *(PRESSED_FORCES if known else ())):
+        at = {"chambers": across} if feature in PRESSED_FORCES else {}
+        kind = ScaledDrag if feature in DRAGS else ScaledForce
+        yield kind(name=_written(feature, body), body=body, feature=feature, **at)
+
+
+def _flows(plant: Plant, part: GasVolume) -> Iterator[Effect]:
+    """Of several supplies the first; of several commands none, no one says which is whose."""
+    at = {"chamber": part.name}
+    yield ConstantFlow(name=_named(ConstantFlow, part.name), **at)
+    supplies = [part.name for part in plant.parts if isinstance(part, Supply)]
+    if supplies:
+        name = _named(PressureFlow, part.name)
+        yield PressureFlow(name=name, **at, supply=supplies[0])
+    body = getattr(part, "body", None)
+    if body:
+        yield SpeedFlow(name=_named(SpeedFlow, part.name), **at, body=body)
+    for outside in _outside(plant):
+        moved = [(MOVED_FLOWS, {"body": body})] if body else []
+        single = len(plant.commands) == 1
+        commanded = [(COMMANDED_FLOWS, _command(plant.commands[0]))] if single else []
+        for features, more in ((GAUGE_FLOWS, {}), *moved, *commanded):
+            for feature in features:
+                name = _written(feature, part.name)
+                yield ScaledFlow(name=name, feature=feature, outside=outside, **at, **more)
+
+
+def _outside(plant: Plant) -> list[str]:
+    """The first atmosphere, as a list; none where the plant has none."""
+    return [part.name for part in plant.parts if isinstance(part, Atmosphere)][:1]
+
+
+def _command(signal: Signal) -> dict[str, Any]:
+    """A command as a share of its range to either side of where it rests."""
+    sides = [abs(end - signal.nominal) for end in (signal.lower, signal.upper)]
+    span = max((side for side in sides if 0.0 < side < inf), default=1.0)
+    return {"command": signal.name, "rest": signal.nominal, "span": span}
+
+
+def _written(feature: Feature, place: str) -> str:
+    return f"{PREFIX}{written_as(feature)}]@{place}"
 
 
 def _named(kind: type[Effect], place: str) -> str:

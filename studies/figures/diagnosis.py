@@ -24,9 +24,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from workbench.diagnosis.result import Dependence, Diagnosis, Where
+    from workbench.diagnosis.missing_term import Dependence, Loop
+    from workbench.diagnosis.result import Diagnosis, Where
 
 SHOWN, SHOWN_BALANCES = 10, 8
+SAID = 0.02  # of the variance of a missing term: less that parameters explain is not said
 
 
 def diagnosis_figures(found: Diagnosis, prefix: str = "") -> dict[str, Figure]:
@@ -95,11 +97,19 @@ def _draw_term(axes: Axes, where: Where) -> None:
     factor, label = _term(where)
     time_s, term, spread = thinned(where.time_s, factor * where.term, factor * where.term_deviation)
     axes.fill_between(time_s, term - spread, term + spread, color=BLUE, alpha=0.2, linewidth=0)
+    if where.intensities:
+        (other,) = thinned(factor * where.intensities.term)
+        softer = where.intensities.neighbour < where.intensities.likeliest
+        label_other = f"walk {'slower' if softer else 'faster'} than the likeliest"
+        axes.plot(time_s, other, color=ORANGE, linewidth=0.6, linestyle="--", label=label_other)
     axes.plot(time_s, term, color=BLUE, linewidth=0.6, label="missing term, one deviation shaded")
     axes.set_xlabel("time (s)")
     axes.set_ylabel(label)
-    axes.set_title(f"what the balance {public_name(where.balance)} lacks")
-    axes.legend(loc="upper right")
+    told = f"what the balance {public_name(where.balance)} lacks"
+    if where.imitated > SAID:
+        told += f" (below: without {100.0 * where.imitated:.0f} % that parameters may explain)"
+    axes.set_title(told)
+    axes.legend(loc="upper right", ncols=2)
 
 
 def _draw_balances(axes: Axes, where: Where) -> None:
@@ -121,9 +131,30 @@ def _draw_dependence(axes: Axes, where: Where, dependence: Dependence) -> None:
     per = 1.0 / display_scale(plain).factor
     centres, means, spreads = dependence.bins * np.array([[per], [factor], [factor]])
     axes.fill_between(centres, means - spreads, means + spreads, color=BLUE, alpha=0.2, linewidth=0)
-    axes.plot(centres, means, "o-", color=BLUE, markersize=2.5, label="mean, one deviation shaded")
+    loop = dependence.memory
+    if loop:
+        _draw_loop(axes, loop, per, factor)
+    else:
+        axes.plot(centres, means, "o-", color=BLUE, markersize=2.5)
+        if dependence.neighbour is not None:
+            axes.plot(centres, factor * dependence.neighbour, "--", color=ORANGE)
     axes.axhline(0.0, color=GREY, linewidth=0.6)
     shown = labelled(plain)
     axes.set_xlabel(f"rate of {shown[:-1]}/s)" if rated else shown)
     axes.set_ylabel(label)
-    axes.set_title(f"explains {100.0 * dependence.explains:.0f} %")
+    axes.locator_params(axis="x", nbins=4)
+    also = f", a loop {100.0 * loop.adds:.0f} % more" if loop else ""
+    axes.set_title(f"explains {100.0 * dependence.explains:.0f} %{also}")
+
+
+def _draw_loop(axes: Axes, loop: Loop, per: float, factor: float) -> None:
+    """The two ways of a loop: memory."""
+    by = public_name(loop.by).replace("_", " ").replace(".", " ")
+    ways = ("positive", "negative") if "velocity" in loop.by else ("rising", "falling")
+    styles = ("^-", BLUE), ("v--", RED)
+    for way, (marks, colour), (centres, means) in zip(ways, styles, loop.branches, strict=True):
+        label = f"{by} {way}"
+        axes.plot(per * centres, factor * means, marks, color=colour, markersize=2.5, label=label)
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high + 0.5 * (high - low))  # room for the legend
+    axes.legend(loc="upper left")

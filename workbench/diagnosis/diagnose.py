@@ -31,7 +31,7 @@ from workbench.diagnosis.ranking import ranked
 from workbench.diagnosis.refit import Refit, refit, refit_shift
 from workbench.diagnosis.result import NAMING, Diagnosis, Law, Ranked, Where
 from workbench.diagnosis.rough import rough_fit
-from workbench.diagnosis.scan import Profile, scan
+from workbench.diagnosis.scan import Profile, scan_catalogue
 from workbench.diagnosis.shifts import Shift, shifts
 from workbench.diagnosis.verdict import far_above_noise, judged, sentence, unexplained, unsteady
 from workbench.diagnosis.where import acts_in, locate
@@ -142,7 +142,7 @@ class _Followed:
 def _followed(problem: Problem, where: Where | None, progress: Progress) -> _Followed:
     """Scan the catalogue and refit the best few."""
     progress("scan of the catalogue")
-    profiles = _scanned(problem)
+    profiles = scan_catalogue(problem)
     looked = _shortlist(profiles, where)
     progress(f"first fits of {len(looked)} candidates")
     begun = sorted((rough_fit(problem, p) for p in looked), key=lambda each: -each.share)
@@ -182,23 +182,6 @@ def _best_share(refits: list[Refit]) -> float:
     return max((each.drop_train for each in refits if predicts(each)), default=0.0)
 
 
-def _scanned(problem: Problem) -> list[Profile]:
-    """Profiles of the causes that are not there and not shifts of fitted parameters."""
-    base = problem.base
-    values = base.plant.values
-    known = problem.whole.parameters
-    absent = [
-        c
-        for c in problem.whole.candidates.values()
-        if c.held is None and c.strength not in problem.rig.fixed
-        and c not in problem.added and base.windows.plant.ready_for(c)
-        and (c.cause.tolerated or values.get(c.strength, known[c.strength].null)
-             == known[c.strength].null)
-    ]  # fmt: skip
-    at = problem.linearised
-    return scan(problem.whole, base.windows, base.unknowns, base.point, absent, at)
-
-
 def _law(
     problem: Problem, ranking: tuple[Ranked, ...], profiles: list[Profile], progress: Progress
 ) -> Law | None:
@@ -214,7 +197,7 @@ def _law(
         return None
     progress("empirical law")
     led_by = (p.drop for p in profiles if certain and p.candidate == leader.candidate)
-    law = empirical_law(problem, max(led_by, default=0.0))
+    law = empirical_law(problem, profiles, max(led_by, default=0.0))
     followed = [r for r in ranking if r.accepted or r.reasons == (SHARE_REASON,)]
     effect, shift = (
         max((r.drop_train for r in followed if r.kind is kind), default=0.0)

@@ -1,48 +1,55 @@
 """An empirical law for what no effect of the catalogue explains.
 
-The terms of :mod:`workbench.effects.empirical` go through the same projected scan and the same
-refit by shooting as every effect (coefficients regressed from a smoothed term would be attenuated),
-at most three, one after the other, as long as each takes another tenth of the misfit.  The result
-is judged like an effect and labelled empirical.
+Of the terms of :mod:`workbench.effects.empirical` a law takes at most three, one after the other,
+as long as each takes another tenth of the misfit.  The next one is chosen by
+:mod:`workbench.diagnosis.law_choice` and goes through the same projected scan and the same refit by
+shooting as every effect.  The result is judged like an effect and labelled empirical.
 
 Source: diagnosis.md 1.9.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
-
-import numpy as np
 
 from workbench.candidate import Candidate
 from workbench.diagnosis.judge import reasons_against
+from workbench.diagnosis.law_choice import worth_scanning
 from workbench.diagnosis.refit import Refit, held_out_drop, refit
 from workbench.diagnosis.result import Law, LawTerm
 from workbench.diagnosis.rough import rough_fit
-from workbench.diagnosis.scan import scan
+from workbench.diagnosis.scan import Profile, scan
 from workbench.fitting.problem import Problem, misfit
 from workbench.law_range import seen_in
+from workbench.law_scales import scales
 from workbench.plant import Plant
 from workbench.recording import Recording
-from workbench.rig_laws import is_law, law_terms, with_laws
+from workbench.rig_laws import is_law, law_terms, laws_of, with_laws
 
 MOST_TERMS = 3
 LEAST_TERM_SHARE = 0.10  # of the misfit that another term must take
+LEAST_PROMISE = 0.03  # of the misfit, of the secant of a term on top of others
 
 
-def empirical_law(problem: Problem, to_beat: float = 0.0) -> Law | None:
+def empirical_law(problem: Problem, known: Sequence[Profile], to_beat: float = 0.0) -> Law | None:
     """The law of up to three terms that passes every criterion; None where none does.
 
-    None, too, where the scan of its first term promises less than ``to_beat``, which the scan of
-    an effect promised.
+    ``known`` are the profiles of the catalogue at the base: what they do is no law.  None, too,
+    where the scan of its first term promises less than ``to_beat``, which the scan of an effect
+    promised.
     """
     problem = with_terms(problem)
     first = problem
     steps: list[LawTerm] = []
     best: Refit | None = None
+    terms = [c for c in problem.whole.candidates.values() if is_law(c.name)]
     for _ in range(MOST_TERMS):
-        found = _next_term(problem, 0.0 if steps else to_beat)
+        # What has a name at the base has none to offer on top of a term that imitates it either.
+        terms = [term for term in terms if term not in problem.added]
+        least = LEAST_PROMISE * first.misfit if steps else 0.0
+        chosen, terms = worth_scanning(problem, terms, () if steps else known, least)
+        found = _refitted(problem, chosen, 0.0 if steps else to_beat)
         if not found or found.drop_train * misfit(problem.base) < LEAST_TERM_SHARE * first.misfit:
             break
         counted = _counted_from(first, found)
@@ -62,55 +69,29 @@ def empirical_law(problem: Problem, to_beat: float = 0.0) -> Law | None:
 
 
 def with_terms(problem: Problem) -> Problem:
-    """The problem with all empirical terms that its plants have a place for, absent."""
+    """The problem with all empirical terms that its plant has a place for, absent."""
     recordings = problem.base.windows.recordings
-
-    def more(plant: Plant) -> Plant:
-        return plant_with_terms(plant, recordings)
-
-    base = problem.base
-    fit = replace(base, windows=replace(base.windows, plant=more(base.windows.plant)))
-    held_out = problem.base_validation
-    if held_out:
-        windows = replace(held_out.windows, plant=fit.windows.plant)
-        held_out = replace(held_out, windows=windows)
-    return replace(problem, whole=more(problem.whole), base=fit, base_validation=held_out)
+    return replace(problem, whole=plant_with_terms(problem.whole, recordings))
 
 
 def plant_with_terms(
     plant: Plant, recordings: Iterable[Recording], names: Iterable[str] = ()
 ) -> Plant:
-    """A plant with empirical terms, absent, around the middles of the recorded strokes.
+    """A plant with empirical terms, absent, in the sizes of the recordings.
 
     All that it has a place for, or the named ones.
     """
     there = {effect.name for effect in plant.effects}
     names = [name for name in (names or law_terms(plant)) if name not in there]
     plant = with_laws(plant, names)
-    middles = {
-        f"{effect.name}.middle_m": _middle(effect.body, recordings)
-        for effect in plant.effects
-        if effect.name in names and "middle_m" in effect.parameters()
-    }
-    return plant.with_values(middles)
+    new = [law for law in laws_of(plant) if law.name in names]
+    return plant.with_values(scales(new, [*recordings]))
 
 
-def _middle(body: str, recordings: Iterable[Recording]) -> float:
-    """Middle of the recorded stroke of a body in m, 0 where no position was recorded."""
-    name = f"{body}.position_m"
-    values = [r[name] for r in recordings if name in r.channels]
-    if not values:
-        return 0.0
-    low, high = (end([end(v) for v in values]) for end in (np.nanmin, np.nanmax))
-    return float((low + high) / 2)
-
-
-def _next_term(problem: Problem, to_beat: float) -> Refit | None:
+def _refitted(problem: Problem, chosen: Sequence[Candidate], to_beat: float) -> Refit | None:
     """The refit of the term that the scan puts first, on top of those that are there."""
     at = problem.base
-    candidates = problem.whole.candidates.values()
-    left = [c for c in candidates if is_law(c.name) and c not in problem.added]
-    profiles = scan(problem.whole, at.windows, at.unknowns, at.point, left, at.derivatives)
+    profiles = scan(problem.whole, at.windows, at.unknowns, at.point, chosen, at.derivatives)
     if not profiles or profiles[0].drop <= to_beat:
         return None
     return refit(problem, rough_fit(problem, profiles[0]))

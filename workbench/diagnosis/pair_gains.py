@@ -24,7 +24,8 @@ from math import nan
 import numpy as np
 
 from workbench.candidate import together
-from workbench.diagnosis.scan import Metric, Profile, Trial, every_second
+from workbench.diagnosis.metric import Metric, every_second
+from workbench.diagnosis.scan import Profile, Trial
 from workbench.effect import Parameter
 from workbench.fitting.problem import Problem
 

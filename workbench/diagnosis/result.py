@@ -9,6 +9,7 @@ from enum import Enum
 import numpy as np
 
 from workbench.candidate import Candidate
+from workbench.diagnosis.missing_term import Dependence, Intensities, Loop
 from workbench.effect import Kind
 from workbench.fitting.errors import SignalError
 from workbench.fitting.gauss_newton import Fit
@@ -118,19 +119,6 @@ class Ranked:
 
 
 @dataclass(frozen=True)
-class Dependence:
-    """The missing term of a balance against one variable.
-
-    ``explains`` is the correlation ratio; ``bins`` holds centres, means and standard deviations,
-    shape (3, n_bins), in SI; ``term`` is named with its unit, for example ``force_n``.
-    """
-
-    variable: str
-    explains: float
-    bins: np.ndarray
-
-
-@dataclass(frozen=True)
 class Where:
     """Where the model fails.
 
@@ -140,14 +128,20 @@ class Where:
         Log-likelihood gained by an unknown input in each balance, at prior parameters.
     balance
         The one that gains most.
-    term, term_unit
-        Its missing term over the training recording, shape (n,), in SI.
+    term
+        Its missing term over the training recording, shape (n,), in SI, named by ``term_name``
+        with its unit, for example ``force_n``.
     term_deviation, time_s
         Its standard deviation and the sample times, shape (n,).
     against
         Its dependence on the driving variables, strongest first.
     by_regime
         Share of the squared error by regime, largest first.
+    intensities
+        Of the random walk that the term is, and the term at another one.
+    imitated
+        Share of the term's variance that the nominal parameters explain within their priors; it
+        is left out in ``against``.
     """
 
     balance: str
@@ -158,6 +152,15 @@ class Where:
     term_deviation: np.ndarray
     against: tuple[Dependence, ...]
     by_regime: Mapping[str, float]
+    intensities: Intensities | None = None
+    imitated: float = 0.0
+
+    @property
+    def memory(self) -> tuple[Dependence, Loop] | None:
+        """The variable that the term follows most, and the loop it runs there; None without."""
+        first = next(iter(self.against), None)
+        loop = first and first.memory
+        return (first, loop) if first and loop else None
 
 
 @dataclass(frozen=True)

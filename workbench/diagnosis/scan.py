@@ -28,16 +28,15 @@ import numpy as np
 
 from workbench.candidate import Candidate
 from workbench.diagnosis.blind_starts import blind_starts, freed
+from workbench.diagnosis.metric import Metric, every_second
 from workbench.effect import Parameter
-from workbench.fitting.linearised import Linearised, Normal, Point, linearise, normal_equations
-from workbench.fitting.problem import staged, stateless
+from workbench.fitting.linearised import Linearised, Point
+from workbench.fitting.problem import Problem, staged, stateless
 from workbench.fitting.start_states import carried
 from workbench.fitting.unknowns import Unknowns
 from workbench.fitting.windows import Windows
 from workbench.plant import Plant
 
-FEWEST_WINDOWS = 24  # that a scan looks at; half of them where there are more
-LARGEST_STEP = 6.0  # prior deviations a nuisance may move in one linear step
 WIDER = 3.0  # times as wide: the priors of the second look (diagnosis.md 2: 5 % and 15 %)
 
 
@@ -83,109 +82,6 @@ class Profile:
         return max(self.trials[0].drop, 0.0)
 
 
-@dataclass(frozen=True)
-class Metric:
-    """The nuisance-free metric M at a fitted point; see the module's docstring."""
-
-    at: Linearised
-    normal: Normal
-
-    @property
-    def cost(self) -> float:
-        """c(0): the projected cost of the model as it is."""
-        return self._value(self.normal.residual, self.normal.gradient)
-
-    def loosened(self, ratio: float) -> Metric:
-        """The same with priors of the parameters ``ratio`` times as wide: Lambda / ratio^2."""
-        normal = self.normal
-        less = (1.0 - ratio**-2) * normal.precision
-        looser = replace(
-            normal,
-            hessian=normal.hessian - np.diag(less),
-            gradient=normal.gradient - less * self.at.point.t,
-            precision=normal.precision - less,
-        )
-        return replace(self, normal=looser)
-
-    def rows(self, residuals: np.ndarray) -> np.ndarray:
-        """Residuals (n, n_y, n_windows, L) as projected rows, shape (n, n_windows, rows)."""
-        n, n_y, n_w, length = residuals.shape
-        flat = residuals.transpose(2, 1, 3, 0).reshape(n_w, n_y * length, n)
-        away = self.at.residual[:, n_y * length :, None]
-        full = np.concatenate([flat, np.repeat(away, n, axis=2)], axis=1)
-        return self.at.projected(full).transpose(2, 0, 1)
-
-    def explained(self, row: np.ndarray) -> tuple[float, np.ndarray]:
-        """(cost, linear step of the scaled unknowns) for projected rows (n_windows, rows)."""
-        flat = self._columns
-        gradient = flat.T @ row.ravel() + self.normal.precision * self.at.point.t
-        step = -np.linalg.solve(self.normal.hessian, gradient) if len(gradient) else gradient
-        return self._value(row, gradient), np.clip(step, -LARGEST_STEP, LARGEST_STEP)
-
-    def signature(self, row: np.ndarray) -> tuple[np.ndarray, float]:
-        """(what the nuisances cannot imitate of a change, share of it that they can)."""
-        flat = self._columns
-        change = row.ravel()
-        if not flat.shape[1]:
-            return change, 0.0
-        left = change - flat @ np.linalg.solve(self.normal.hessian, flat.T @ change)
-        whole = float(change @ change)
-        share = 1.0 - float(change @ left) / whole if whole > 0 else 1.0
-        return left, float(np.clip(share, 0.0, 1.0))
-
-    def shown(self, row: np.ndarray) -> float:
-        """What a change adds to the projected cost where nothing else is wrong: d'Md."""
-        flat, change = self._columns, row.ravel()
-        along = flat.T @ change
-        imitated = float(along @ np.linalg.solve(self.normal.hessian, along)) if len(along) else 0.0
-        return max(float(change @ change) - imitated, 0.0)
-
-    def gram(self, changes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(D'MD, D'Mr) of changes D as rows (n, rows), with the prior's offset in the second.
-
-        An amount a of each costs c(a) = c(0) + 2 a'D'Mr + a'D'MD a.
-        """
-        flat = self._columns
-        along = changes @ flat
-        gram, slope = changes @ changes.T, changes @ self.normal.residual.ravel()
-        if not flat.shape[1]:
-            return gram, slope
-        solved = np.linalg.solve(self.normal.hessian, np.c_[along.T, self.normal.gradient])
-        return gram - along @ solved[:, :-1], slope - along @ solved[:, -1]
-
-    @property
-    def _columns(self) -> np.ndarray:
-        J = self.normal.derivatives
-        return J.reshape(J.shape[0] * J.shape[1], J.shape[2])
-
-    def _value(self, row: np.ndarray, gradient: np.ndarray) -> float:
-        prior = float(np.sum(self.normal.precision * self.at.point.t**2))
-        gained = (
-            float(gradient @ np.linalg.solve(self.normal.hessian, gradient))
-            if len(gradient)
-            else 0.0
-        )
-        return float(row.ravel() @ row.ravel()) + prior - gained
-
-
-def metric_at(
-    windows: Windows, unknowns: Unknowns, point: Point, at: Linearised | None = None
-) -> Metric:
-    """The metric M at a point, from derivatives there or from one batch of simulations."""
-    at = at or linearise(windows, unknowns, point)
-    return Metric(at, normal_equations(at, unknowns))
-
-
-def every_second(
-    windows: Windows, unknowns: Unknowns, point: Point, at: Linearised | None = None
-) -> tuple[Windows, Point, Metric, float]:
-    """Every second window where there are many: (windows, point, metric, how many each counts)."""
-    total = len(windows)
-    windows, kept = windows.part(max(total // 2, FEWEST_WINDOWS))
-    point, at = replace(point, starts=point.starts[:, kept]), at.part(kept) if at else None
-    return windows, point, metric_at(windows, unknowns, point, at), total / len(windows)
-
-
 def scan(
     whole: Plant,
     windows: Windows,
@@ -226,6 +122,23 @@ def scan(
         sizes = [_typical_sizes(known[c.strength], change[c.strength]) for c, change in trials]
         profiles += _profiles(metric, trials, sizes, rows, of_all)
     return sorted(profiles, key=lambda profile: -profile.drop)
+
+
+def scan_catalogue(problem: Problem) -> list[Profile]:
+    """Profiles of the causes that are not there and not shifts of fitted parameters."""
+    base = problem.base
+    values = base.plant.values
+    known = problem.whole.parameters
+    absent = [
+        c
+        for c in problem.whole.candidates.values()
+        if c.held is None and c.strength not in problem.rig.fixed
+        and c not in problem.added and base.windows.plant.ready_for(c)
+        and (c.cause.tolerated or values.get(c.strength, known[c.strength].null)
+             == known[c.strength].null)
+    ]  # fmt: skip
+    at = problem.linearised
+    return scan(problem.whole, base.windows, base.unknowns, base.point, absent, at)
 
 
 def sizes_to_try(plant: Plant, candidate: Candidate) -> list[dict[str, float]]:

@@ -56,12 +56,14 @@ class Suspect:
 
     balance       its name, ``chamber_a.mass``
     term          the flow by name with its unit
+    state         whose rate the flow drives
     parameter     the flow in the plant of :func:`with_missing_flows`
     intensities   what the flow may gain per square root of a second, in its unit
     """
 
     balance: str
     term: str
+    state: str
     parameter: str
     intensities: tuple[float, ...]
 
@@ -92,6 +94,7 @@ def suspects(
         Suspect(
             balance=flow.place or "",
             term=flow.equation.term,
+            state=f"{flow.part}.{flow.equation.state}",
             parameter=f"{flow.name}.flow",
             intensities=tuple(
                 rate / answer for rate in astray.rates[f"{flow.part}.{flow.equation.state}"]

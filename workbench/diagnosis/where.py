@@ -3,7 +3,8 @@
 A random walk is added to one balance at a time, at *prior* parameters: a deterministic fit would
 spread a valve or leak error into mass and damping and move the blame (diagnosis.md 4.3).  The gain
 of log-likelihood over the filter without it, at the best of a few intensities, names the balance;
-the smoothed walk, in N or kg/s, against the variables that drive it shows what is missing.
+the smoothed walk, in N or kg/s, against the variables that drive it shows what is missing
+(:mod:`workbench.diagnosis.dependence`).
 
 Heat enters a pressure as a flow of gas does, and only the mass tells them apart, which nobody
 measures: the energy balance of a gas is named where it gains clearly more than its mass balance.
@@ -19,7 +20,14 @@ import numpy as np
 
 from workbench.candidate import Candidate
 from workbench.comparison.regimes import regime_shares
-from workbench.diagnosis.result import Dependence, Where
+from workbench.diagnosis.dependence import (
+    dependences,
+    direction,
+    imitated,
+    parameter_columns,
+    side,
+)
+from workbench.diagnosis.result import Intensities, Where
 from workbench.diagnosis.suspects import Suspect, suspects, wandering, with_missing_flows
 from workbench.effect import Balance
 from workbench.filter_passes import FilterResult, log_likelihoods, recording_filter, smooth
@@ -28,11 +36,11 @@ from workbench.fitting.window_length import moves
 from workbench.plant import Plant
 from workbench.plant_filter import PlantFilter
 from workbench.recording import Recording
+from workbench.simulation import inputs
 
 GRID_S = 5e-3  # of the filter
 LONGEST = 2000  # steps of the filter where nothing does
 CLEARLY_MORE = 1.05  # times the gain of the mass balance
-BINS = 15
 INTO_GAS = (Balance.VALVE, Balance.FLOW, Balance.MASS, Balance.ENERGY, Balance.SUPPLY)
 
 
@@ -57,8 +65,14 @@ def locate(problem: Problem, recordings: Sequence[Recording]) -> Where | None:
     if not gains:
         return None
     worst = _worst(gains)
-    result = smooth(lacking({worst.parameter: gains[worst][1]}), recording)
-    term = result.unknown[0]
+    likeliest = gains[worst][1]
+    neighbour = _neighbour(worst, likeliest)
+    filters = lacking({worst.parameter: likeliest})
+    result, other = (smooth(filters, recording, q / likeliest) for q in (likeliest, neighbour))
+    term, at = result.unknown[0], _along(plant, recording, result, decimate)
+    columns = parameter_columns(plant, problem.base.unknowns, worst.state, worst.parameter, at)
+    rest, rest_other = (d - imitated(d, columns) for d in (term, other.unknown[0]))
+    drivers = _drivers(plant, result, at[1])
     return Where(
         balance=worst.balance,
         by_balance={s.balance: gain for s, (gain, _) in gains.items()},
@@ -66,9 +80,17 @@ def locate(problem: Problem, recordings: Sequence[Recording]) -> Where | None:
         time_s=result.time_s,
         term=term,
         term_deviation=result.unknown_deviation[0],
-        against=_dependences(plant, recording, result, term, decimate),
+        against=dependences(drivers, _directions(plant, worst, drivers), rest, rest_other),
         by_regime=regime_shares(problem.base),
+        intensities=Intensities(likeliest, neighbour, other.unknown[0]),
+        imitated=max(1.0 - float(rest.var() / term.var()), 0.0) if term.any() else 0.0,
     )
+
+
+def _neighbour(suspect: Suspect, likeliest: float) -> float:
+    """The next lower intensity that was tried; of the lowest the next higher one."""
+    tried = sorted(suspect.intensities)
+    return tried[abs(tried.index(likeliest) - 1)]
 
 
 def _grid_s(plant: Plant, recording: Recording) -> float:
@@ -120,39 +142,33 @@ def _gains(
     return gains
 
 
-def _dependences(
-    plant: Plant, recording: Recording, result: FilterResult, term: np.ndarray, decimate: int
-) -> tuple[Dependence, ...]:
-    """Correlation ratio of the term with each driving variable, strongest first."""
-    n = len(term)
+def _along(
+    plant: Plant, recording: Recording, result: FilterResult, decimate: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Smoothed states, commands and measured inputs at each sample of the filter."""
+    used = [(inputs(plant, piece), len(piece) // decimate * decimate) for piece in recording.pieces]
+    u, d = (np.hstack([both[k][:, : max(n, 1) : decimate] for both, n in used]) for k in (0, 1))
+    return result.states, u, d
+
+
+def _drivers(plant: Plant, result: FilterResult, commands: np.ndarray) -> dict[str, np.ndarray]:
+    """States, commands and their rates: what a missing term may follow, by name."""
     drivers = dict(zip(result.state_names, result.states, strict=True))
-    for name in plant.model.commands:
-        used = (max(len(piece) // decimate, 1) * decimate for piece in recording.pieces)
-        pairs = zip(recording.pieces, used, strict=True)
-        command = np.concatenate([piece[name][:last:decimate] for piece, last in pairs])
+    for name, command in zip(plant.model.commands, commands, strict=True):
         drivers[name] = command
         drivers[f"rate of {name}"] = np.gradient(command, result.time_s)
-    found = [_dependence(name, values[:n], term[: len(values)]) for name, values in drivers.items()]
-    return tuple(sorted(found, key=lambda each: -each.explains))
+    return drivers
 
 
-def _dependence(name: str, values: np.ndarray, term: np.ndarray) -> Dependence:
-    """eta^2 = Var(E[d|s]) / Var(d) over quantile bins of s."""
-    edges = np.unique(np.quantile(values, np.linspace(0, 1, BINS + 1)))
-    if len(edges) < 3:
-        return Dependence(name, 0.0, np.zeros((3, 0)))
-    where = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, len(edges) - 2)
-    members = [where == k for k in range(len(edges) - 1)]
-    members = [inside for inside in members if inside.any()]
-    means = np.array([term[inside].mean() for inside in members])
-    counts = np.array([inside.sum() for inside in members])
-    between = float(np.sum(counts * (means - term.mean()) ** 2) / len(term))
-    variance = float(term.var())
-    bins = np.array(
-        [
-            [values[inside].mean() for inside in members],
-            means,
-            [term[inside].std() for inside in members],
-        ]
-    )
-    return Dependence(name, between / variance if variance > 0 else 0.0, bins)
+def _directions(
+    plant: Plant, suspect: Suspect, drivers: Mapping[str, np.ndarray]
+) -> dict[str, np.ndarray]:
+    """Ways by which a term is split: of the body of its balance, and of each command."""
+    place = suspect.balance.rpartition(".")[0]
+    bodies = [place, *(getattr(p, "body", None) for p in plant.parts if p.name == place)]
+    found = {
+        name: side(values)
+        for name, values in drivers.items()
+        if name.partition(".velocity_")[0] in bodies and ".velocity_" in name
+    }
+    return found | {name: direction(drivers[name]) for name in plant.model.commands}

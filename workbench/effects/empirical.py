@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import inf
+from typing import ClassVar
 
 from workbench.effect import (
     Balance,
@@ -22,6 +23,7 @@ from workbench.effect import (
     form,
     strength,
 )
+from workbench.effects.law_features import Feature, Here, product, size_of, written
 
 SOURCE = "diagnosis.md 1.9: sparse law of one balance"
 ROUND_M, ROUND_M_S = 1e-6, 1e-6  # where |x| and |v| turn smoothly
@@ -68,7 +70,7 @@ class SquareDrag(EmpiricalForce):
     quadratic_n_s2_m2: Expression = strength(typical=300.0, lower=-30.0, upper=1e5)
 
     def force_n(self, velocity_m_s: Expression, position_m: Expression) -> Expression:
-        return -self.quadratic_n_s2_m2 * velocity_m_s * _size(velocity_m_s, ROUND_M_S)
+        return -self.quadratic_n_s2_m2 * velocity_m_s * size_of(velocity_m_s, ROUND_M_S)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,7 +93,7 @@ class PlacedDrag(EmpiricalForce):
     middle_m: Expression = form(0.0, lower=-inf)
 
     def force_n(self, velocity_m_s: Expression, position_m: Expression) -> Expression:
-        away_m = _size(position_m - self.middle_m, ROUND_M)
+        away_m = size_of(position_m - self.middle_m, ROUND_M)
         return -self.placed_viscous_n_s_m2 * velocity_m_s * away_m
 
 
@@ -156,12 +158,89 @@ class SpeedFlow(EmpiricalFlow):
     speed_kg_m: Expression = strength(typical=5e-4, lower=-1e-1, upper=1e-1)
 
     def flow_kg_s(self, now: Conditions) -> Expression:
-        return self.speed_kg_m * _size(now[self.body].velocity_m_s, ROUND_M_S)
+        return self.speed_kg_m * size_of(now[self.body].velocity_m_s, ROUND_M_S)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ScaledForce(EmpiricalForce):
+    """F = a g(v / v_0, 2 (x - x_m) / L, (p_1 - p_2) / p_0), in sizes of the recordings.
+
+    ``chambers`` are two whose pressures push the body, each against the other, or one and what is
+    outside.
+
+    Source: diagnosis.md 1.9.
+    """
+
+    direction: ClassVar[float] = 1.0
+
+    feature: Feature
+    chambers: tuple[str, ...] = ()
+    size_n: Expression = strength(typical=20.0, lower=-500.0, upper=500.0)
+    speed_m_s: Expression = form(1.0, lower=1e-6)
+    middle_m: Expression = form(0.0, lower=-inf)
+    stroke_m: Expression = form(0.1, lower=1e-6)
+    pressure_pa: Expression = form(1e5, lower=1.0)
+
+    @property
+    def causes(self) -> tuple[Cause, ...]:
+        return _cause(written(self.feature), "size_n", Balance.MOMENTUM)
+
+    def terms(self, now: Conditions) -> Iterator[Force]:
+        moved, across_pa = now[self.body], 0.0
+        if self.chambers:
+            first, second = self.chambers
+            across_pa = now[first].pressure_pa - now[second].pressure_pa
+        here = Here(
+            speed=moved.velocity_m_s / self.speed_m_s,
+            place=2.0 * (moved.position_m - self.middle_m) / self.stroke_m,
+            pressure=across_pa / self.pressure_pa,
+        )
+        yield Force(self.body, self.direction * self.size_n * product(self.feature, here))
+
+
+@dataclass(frozen=True, kw_only=True)
+class ScaledDrag(ScaledForce):
+    """The same against the movement, F = -a g: with it, the body would run away.
+
+    Source: diagnosis.md 1.9.
+    """
+
+    direction = -1.0
+    size_n: Expression = strength(typical=20.0, lower=-2.0, upper=500.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ScaledFlow(EmpiricalFlow):
+    """mdot = w g(v / v_0, (p - p_amb) / p_0, (u - u_0) / U), in sizes of the recordings.
+
+    The command is what reaches the valve; ``rest`` and ``span`` are its u_0 and U in its own unit.
+    ``outside`` is the part with p_amb.
+
+    Source: diagnosis.md 1.9.
+    """
+
+    feature: Feature
+    outside: str
+    body: str | None = None
+    command: str | None = None
+    rest: float = 0.0
+    span: float = 1.0
+    size_kg_s: Expression = strength(typical=1e-4, lower=-1e-2, upper=1e-2)
+    speed_m_s: Expression = form(1.0, lower=1e-6)
+    pressure_pa: Expression = form(1e5, lower=1.0)
+
+    @property
+    def causes(self) -> tuple[Cause, ...]:
+        return _cause(written(self.feature), "size_kg_s", Balance.MASS)
+
+    def flow_kg_s(self, now: Conditions) -> Expression:
+        gauge_pa = now[self.chamber].pressure_pa - now[self.outside].pressure_pa
+        here = Here(
+            speed=now[self.body].velocity_m_s / self.speed_m_s if self.body else 0.0,
+            pressure=gauge_pa / self.pressure_pa,
+            command=(now.read(self.command) - self.rest) / self.span if self.command else 0.0,
+        )
+        return self.size_kg_s * product(self.feature, here)
 
 
 FORCES: tuple[type[EmpiricalForce], ...] = (SquareDrag, CubicDrag, PlacedDrag, CurvedForce)
-
-
-def _size(value: Expression, rounding: float) -> Expression:
-    """|value|, with a derivative everywhere."""
-    return (value**2 + rounding**2) ** 0.5

@@ -1,0 +1,187 @@
+"""Which terms a law takes: those that the recording asks for, in every half of it, without a name.
+
+The truth of the bench is written in plain numpy, here and in ``test_diagnosis``.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_diagnosis import bench, nothing
+
+from workbench.diagnosis.addition import add_law
+from workbench.diagnosis.law import empirical_law, with_terms
+from workbench.diagnosis.law_choice import _Secants, _stable, worth_scanning
+from workbench.diagnosis.scan import scan_catalogue
+from workbench.effects.law_features import Factor, Here, product, written
+from workbench.fitting.problem import pose
+from workbench.law_scales import scales
+from workbench.plants import PLANTS
+from workbench.rig import load_rig
+from workbench.rig_laws import is_law, law_terms, with_laws
+from workbench.rig_writing import rig_text
+
+BARE = 'name = "bench"\nplant = "cylinder_bench"\n[values]\n"chamber.area" = "518.7 mm^2"\n'
+STROKE_M, WAVE_N = 0.06, 5.0  # the bench moves by 30 mm to either side
+SINE, CURVED = "law[sin(2 pi x/L)]@rod", "law[(x - mid)^2]@rod"
+
+
+def made(seed, force_n, gauge_pa=3e5):
+    """The bench, where the rod is pushed by a force of its place (m) and speed (m/s) too."""
+    found = bench(seed, nothing, gauge_pa=gauge_pa)
+    x, v = found["rod.position_m"], found["rod.velocity_m_s"]
+    channels = {**found.channels, "rod.force_n": found["rod.force_n"] - force_n(x, v)}
+    return replace(found, channels=channels)
+
+
+def wavy(x, v):
+    return WAVE_N * np.sin(2 * np.pi * x / STROKE_M)
+
+
+def posed(force_n):
+    train = [made(1, force_n), made(3, force_n, 1e5)]
+    return pose(load_rig(BARE), train, [made(2, force_n, 4e5)])
+
+
+def law_of(problem):
+    return empirical_law(problem, scan_catalogue(problem))
+
+
+def test_a_force_of_magnets_along_the_stroke_is_a_sine_of_it():
+    law = law_of(posed(wavy))
+
+    assert law.balance == "rod.momentum"
+    assert law.terms == {f"{SINE}.size_n": pytest.approx(WAVE_N, rel=0.03)}
+    assert law.ranges["rod.position_m"] == pytest.approx((-0.03, 0.03), abs=1e-4)
+    assert law.drop_validation > 0.95
+
+
+def test_a_law_of_two_terms_names_both():
+    law = law_of(posed(lambda x, v: wavy(x, v) - 6e3 * x**2))
+
+    assert {step.candidate.name for step in law.steps} == {SINE, CURVED}
+    assert law.drop_train > 0.95
+
+
+def test_a_new_term_is_written_into_a_rig_and_read_back_as_the_same_model():
+    train, held_out = [made(1, wavy), made(3, wavy, 1e5)], [made(2, wavy, 4e5)]
+    (step,) = add_law(load_rig(BARE), train, held_out)
+    again = load_rig(rig_text(step.rig))
+
+    assert again.added == (SINE,)
+    assert again.plant == step.rig.plant
+    assert again.plant.values[f"{SINE}.stroke_m"] == pytest.approx(STROKE_M, rel=1e-3)
+    assert again.seen == step.rig.seen
+
+
+@pytest.mark.parametrize(
+    ("force_n", "term"),
+    [
+        (lambda x, v: 9.0 + 0.0 * x, "law[1]@rod"),
+        (lambda x, v: -8.0 * np.sign(v), "law[sign v]@rod"),
+    ],
+    ids=["constant force", "friction"],
+)
+def test_what_the_catalogue_has_a_name_for_is_no_term(force_n, term):
+    problem = posed(force_n)
+    whole = with_terms(problem)
+    terms = [c for c in whole.whole.candidates.values() if is_law(c.name)]
+    _, nameless = worth_scanning(whole, terms, scan_catalogue(problem))
+    chosen, all_of_them = worth_scanning(whole, terms, ())
+
+    assert term in [c.name for c in all_of_them] and chosen[0].name == term
+    assert term not in [c.name for c in nameless]
+    assert CURVED in [c.name for c in nameless]
+
+
+def test_where_nothing_is_missing_there_is_no_law():
+    assert law_of(posed(lambda x, v: 0.0 * x)) is None
+
+
+def secants(gains):
+    """Terms that gain so much, in each window (rows) by themselves."""
+    gains = np.asarray(gains, float)
+    n_w, n = gains.shape
+    grams = np.zeros((n_w, n + 1, n + 1))
+    grams[:, range(n), range(n)] = 1.0
+    grams[:, :n, -1] = grams[:, -1, :n] = -np.sqrt(gains)
+    wide = np.full(n, 1e6)
+    return _Secants(grams, -wide, wide, np.zeros((0, 0)), np.zeros(0))
+
+
+def test_a_term_of_one_window_is_not_stable_however_much_it_gains():
+    everywhere = np.column_stack([np.ones(20), np.zeros(20)])
+    once = everywhere.copy()
+    once[7, 1] = 1e6
+    all_own = np.ones(2, bool)
+
+    assert _stable(secants(everywhere), all_own) == 0
+    assert secants(once).gains(np.arange(20))[0].argmax() == 1
+    assert _stable(secants(once), all_own) is None
+    assert _stable(secants(everywhere), np.array([False, True])) is None
+
+
+def test_two_terms_that_are_all_but_one_share_the_votes():
+    alike = np.column_stack([np.ones(20), np.ones(20)])
+    alike[::2] *= (1.1, 0.9)
+    alike[1::2] *= (0.9, 1.1)
+    alike[0, 1] = 1.5
+
+    assert _stable(secants(alike), np.ones(2, bool)) == 1
+
+
+def test_a_gain_counts_within_the_bounds_of_a_coefficient():
+    one = secants(np.ones((10, 1)))
+    held = replace(one, most=np.array([0.5]))
+
+    assert one.gains(np.arange(10))[0] == pytest.approx(10.0)
+    assert held.gains(np.arange(10))[0] == pytest.approx(10 * (2 * 0.5 - 0.5**2))
+
+
+def test_features_are_what_they_are_written_as():
+    here = Here(speed=-0.5, place=0.5, pressure=0.8, command=-0.25)
+    assert {
+        written(feature): float(product(feature, here))
+        for feature in (
+            (), (Factor.SPEED, Factor.PLACE), (Factor.SPEED_SIGN, Factor.DIFFERENCE),
+            (Factor.SINE,), (Factor.COSINE_HALF,), (Factor.COMMAND_SIZE, Factor.PRESSURE),
+        )
+    } == {
+        "1": 1.0,
+        "v x": -0.25,
+        "sign v dp": pytest.approx(-0.8, rel=1e-3),
+        "sin(2 pi x/L)": 1.0,
+        "cos(pi x/L)": pytest.approx(np.cos(np.pi / 4)),
+        "|u| p": pytest.approx(0.2, rel=1e-3),
+    }  # fmt: skip
+
+
+def test_scales_are_what_was_recorded():
+    plant = PLANTS["servo_drive"]()
+    names = ["law[sign v dp]@slide", "law[|v| p]@chamber_b", "law[|u|]@chamber_a"]
+    laws = [e for e in with_laws(plant, names).effects if e.name in names]
+    t = 1e-3 * np.arange(2000)
+    recorded = replace(
+        bench(1, nothing),
+        sample_time_s=1e-3,
+        channels={
+            "slide.position_m": 0.1 + 0.05 * np.sin(4.0 * t),
+            "chamber_a.pressure_pa": np.full(2000, 6e5),
+            "chamber_b.pressure_pa": 4e5 + 1e5 * np.sin(4.0 * t),
+        },
+    )
+    found = scales(laws, [recorded])
+
+    assert found["law[sign v dp]@slide.stroke_m"] == pytest.approx(0.1, rel=1e-3)
+    assert found["law[sign v dp]@slide.middle_m"] == pytest.approx(0.1, rel=1e-3)
+    assert found["law[|v| p]@chamber_b.speed_m_s"] == pytest.approx(0.2, rel=0.02)
+    assert found["law[sign v dp]@slide.pressure_pa"] == pytest.approx(3e5, rel=1e-3)
+    assert found["law[|v| p]@chamber_b.pressure_pa"] == pytest.approx(5e5, rel=1e-3)
+    valve = next(law for law in laws if law.name == names[2])
+    assert (valve.command, valve.rest, valve.span) == ("valve.command_v", 4.95, 5.05)
+
+
+def test_terms_over_the_atmosphere_need_one_and_those_over_a_command_one_alone():
+    assert "law[p]@chamber" in law_terms(PLANTS["closed_chamber"]())
+    assert not any("[u" in name or "[|u" in name for name in law_terms(PLANTS["gearbox"]()))
+    assert "law[|u| p]@reservoir" in law_terms(PLANTS["servo_reservoir"]())

@@ -1,0 +1,177 @@
+"""What a missing term depends on: nominal parameters taken out, loops named, two intensities."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_report import UNITS, diagnosis
+
+from studies.documents import diagnosis_document
+from studies.figures.diagnosis import diagnosis_figures
+from studies.text_of_results import diagnosis_text
+from workbench.diagnosis.dependence import (
+    dependences,
+    direction,
+    imitated,
+    parameter_columns,
+    side,
+)
+from workbench.diagnosis.missing_term import Intensities
+from workbench.diagnosis.suspects import with_missing_flows
+from workbench.fitting.unknowns import nominal_unknowns
+from workbench.plants import PLANTS
+
+COMMAND, PLACE = "valve.command_v", "slide.position_m"
+STEP_S = 5e-3
+TIME_S = STEP_S * np.arange(2400)
+
+
+def swept(seed=3):
+    """Twelve seconds of a command as a person would play it: slow waves of unequal height."""
+    random = np.random.default_rng(seed)
+    waves = sum(np.sin(2 * np.pi * f * TIME_S + random.uniform(0, 6)) for f in (0.4, 0.9, 1.7))
+    return waves + 0.01 * random.standard_normal(len(TIME_S))
+
+
+def played(command, gap):
+    """Backlash: the output follows once the command has crossed the gap."""
+    found = np.zeros(len(command))
+    for k in range(1, len(command)):
+        found[k] = np.clip(found[k - 1], command[k] - gap / 2, command[k] + gap / 2)
+    return found
+
+
+def against(term, drivers, directions, neighbour=None):
+    return dependences(drivers, directions, term, term if neighbour is None else neighbour)
+
+
+def test_hysteresis_of_a_command_is_a_loop_and_a_curve_is_none():
+    command, drivers = swept(), {COMMAND: swept(), PLACE: swept(4)}
+    ways = {COMMAND: direction(command)}
+    noise = 0.05 * np.random.default_rng(8).standard_normal(len(TIME_S))
+    memory, curve = (
+        against(term + noise, drivers, ways)[0] for term in (played(command, 1.2), command**3)
+    )
+
+    assert memory.variable == curve.variable == COMMAND
+    assert memory.memory.by == COMMAND and memory.memory.adds > 0.05
+    assert np.all(memory.memory.branches[0, 1] < memory.memory.branches[1, 1])  # up lags behind
+    assert curve.memory is None
+    assert max(loop.adds for loop in curve.loops) < 0.02
+
+
+def test_friction_is_a_loop_over_the_place_by_the_side_of_the_velocity():
+    place = np.cumsum(swept()) * STEP_S
+    velocity = np.gradient(place, STEP_S)
+    drivers, ways = {PLACE: place}, {"slide.velocity_m_s": side(velocity)}
+    (dry,) = against(-8.0 * np.sign(velocity), drivers, ways)
+    (spring,) = against(-8.0 * place, drivers, ways)
+
+    assert dry.memory.by == "slide.velocity_m_s" and dry.memory.adds > 0.5
+    assert dry.memory.branches[:, 1] == pytest.approx(np.outer([-8.0, 8.0], np.ones(15)))
+    assert spring.memory is None
+
+
+def test_what_wanders_by_chance_runs_through_no_loop():
+    """A walk as slow as the smoothed term is, with nothing to do with the command."""
+    command, random = swept(), np.random.default_rng(2)
+    slow = np.exp(-np.arange(200) / 40)
+    walks = (np.convolve(random.standard_normal(len(TIME_S)), slow, "same") for _ in range(20))
+    found = [against(w, {COMMAND: command}, {COMMAND: direction(command)})[0] for w in walks]
+
+    assert not any(each.memory for each in found)
+
+
+def test_turns_of_noise_turn_no_direction():
+    command = np.sin(2 * np.pi * 0.4 * TIME_S)
+    noisy = command + 0.01 * np.random.default_rng(1).standard_normal(len(TIME_S))
+
+    found = direction(noisy)
+    assert np.count_nonzero(np.diff(found[found != 0.0])) == 9  # 4.8 periods
+    late = np.gradient(command) * found < 0.0
+    assert late.mean() < 0.15  # a tenth of the deviation after each turn
+    assert np.array_equal(side(np.array([-2.0, -0.01, 0.0, 3.0])), [-1, 0, 0, 1])
+
+
+def test_what_parameters_explain_within_their_priors_is_taken_out_and_no_more():
+    random = np.random.default_rng(5)
+    one, other = (swept(seed) for seed in (6, 7))
+    rest = 0.5 * played(swept(9), 0.8) + 0.01 * random.standard_normal(len(one))
+    columns = np.column_stack([one, other])
+
+    two_deviations = imitated(2.0 * one + rest, columns)
+    assert two_deviations == pytest.approx(2.0 * one, abs=0.25 * np.std(2.0 * one))
+    far = imitated(1e3 * one, columns)
+    assert far.std() < 0.2 * np.std(1e3 * one)  # a prior does not allow a thousand deviations
+    assert not imitated(np.full(len(one), 3.0), columns).any()
+
+
+def test_columns_are_what_one_prior_deviation_does_to_the_balance():
+    lean = PLANTS["servo_drive"]().lean()
+    plant, flows = with_missing_flows(lean)
+    unknowns = nominal_unknowns(lean)
+    n = 4
+    x = plant.initial[:, None] + plant.scale[:, None] * np.linspace(0.1, 0.4, n)
+    u, d, p = plant.nominal
+    u, d = (np.tile(values[:, None], n) + 0.3 for values in (u, d))
+    flow = next(f for f in flows if f.place == "chamber_a.mass")
+    state = "chamber_a.pressure_pa"
+    found = parameter_columns(plant, unknowns, state, f"{flow.name}.flow", (x, u, d))
+
+    def rate(name, step):
+        moved = p.copy()
+        moved[list(plant.model.parameters).index(name)] += step
+        row = list(plant.model.states).index(state)
+        return plant.model.f.map(n)(x, u, d, np.tile(moved[:, None], n))[0].full()[row]
+
+    one = rate(f"{flow.name}.flow", 1e-5) - rate(f"{flow.name}.flow", -1e-5)
+    for name, deviation, column in zip(unknowns.names, unknowns.scale, found.T, strict=True):
+        h = 1e-4 * deviation
+        slope = (rate(name, h) - rate(name, -h)) / (2e-4) / (one / 2e-5)
+        assert column == pytest.approx(slope, rel=1e-4, abs=1e-4 * np.abs(found).max()), name
+    assert np.abs(found).max(axis=0)[list(unknowns.names).index("chamber_a.dead_volume_m3")] > 0.0
+
+
+@pytest.fixture(scope="module")
+def looping():
+    """A diagnosis whose missing flow lags behind the command, at two intensities."""
+    plain, command = diagnosis(), swept()[:400]
+    term = 1e-4 * played(command, 1.2)
+    ways = {COMMAND: direction(command)}
+    drivers = {COMMAND: command, "chamber_a.pressure_pa": 4e5 + 1e5 * swept(4)[:400]}
+    found = dependences(drivers, ways, term, 0.8 * term)
+    where = replace(
+        plain.where, term=term, against=found, intensities=Intensities(1e-4, 1e-5, 0.8 * term),
+        imitated=0.12,
+    )  # fmt: skip
+    return replace(plain, where=where)
+
+
+def test_a_loop_is_named_memory_in_text_and_json(looping):
+    said = diagnosis_text(looping, UNITS)
+    where = diagnosis_document(looping, UNITS)["where"]
+
+    assert "it runs through a loop over valve.command" in said and "memory, such as" in said
+    assert where["memory"] is True
+    first = where["loops"][0]
+    assert (first["variable"], first["by"]) == ("valve.command", "valve.command")
+    assert first["adds"] > 0.05
+    assert where["imitated_by_parameters"] == 0.12
+    assert where["random_walk"] == {
+        "term": "mass_flow", "likeliest": 1e-4, "neighbour": 1e-5, "unit": "kg/s/s^0.5",
+    }  # fmt: skip
+    assert diagnosis_document(diagnosis(), UNITS)["where"]["memory"] is False
+    assert "memory" not in diagnosis_text(diagnosis(), UNITS)
+
+
+def test_the_figure_shows_both_ways_and_both_intensities(looping):
+    figure = diagnosis_figures(looping)["missing_term"]
+    whole, _, first, second = figure.axes
+
+    assert [line.get_label() for line in whole.lines] == [
+        "walk slower than the likeliest", "missing term, one deviation shaded",
+    ]  # fmt: skip
+    assert "a loop" in first.get_title() and "a loop" not in second.get_title()
+    labels = [text.get_text() for text in first.get_legend().get_texts()]
+    assert labels == ["valve command rising", "valve command falling"]
+    assert len(second.lines) == 3  # mean, the other intensity, zero
