@@ -102,6 +102,11 @@ class Mode:
         }
         return control.ss(A, B, C, self.D, name=self.name, **labels)
 
+    def sent(self, model: DesignModel, command: np.ndarray) -> np.ndarray:
+        """All commands of the model: the mode's own, and switches at their level."""
+        own = dict(zip(self.command_names, command, strict=True))
+        return np.array([own[n] if n in own else self.box[n].point for n in model.commands])
+
     def rates(self, state: np.ndarray, command: np.ndarray) -> np.ndarray:
         """dx/dt of the affine model, shape (n_x,)."""
         return self.drift + self.A @ (state - self.state) + self.B @ (command - self.command)
@@ -204,15 +209,13 @@ def linearised_all(
     """
     if not boxes:
         return ()
-    states, commands = (np.column_stack([getattr(p, k) for p in points]) for k in _POINT)
+    states = np.column_stack([point.state for point in points])
+    commands = np.column_stack([point.command for point in points])
     found = [block.full() for block in (*model.jacobians(states, commands),)]
     outputs = model.f(states, commands)[1].full().T
     blocks = zip(*(np.split(block, len(boxes), axis=1) for block in found), strict=True)
     made = (_mode(model, *each) for each in zip(boxes, points, blocks, outputs, strict=True))
     return tuple(made)
-
-
-_POINT = ("state", "command")
 
 
 def _mode(
@@ -256,7 +259,9 @@ def _require_inside(
     values = (*point.state, *point.command)
     at = dict(zip((*model.states, *model.commands), values, strict=True))
     wrong = [
-        Message(f"the point of mode '{name}' is at {at[signal]:g}, outside '{region.label}'", signal)
+        Message(
+            f"the point of mode '{name}' is at {at[signal]:g}, outside '{region.label}'", signal
+        )
         for signal, region in box.items()
         if not region.contains(at[signal])
     ]

@@ -87,34 +87,35 @@ class DesignModel:
     @cached_property
     def f(self) -> ca.Function:
         """(x, u) -> (dx/dt, y), x the kept states."""
-        return ca.Function("design", [*self._symbols], [*self._expressions])
+        return ca.Function("design", [*self.symbols], [*self._expressions])
 
     @cached_property
     def jacobians(self) -> ca.Function:
         """(x, u) -> (A, B, C, D)."""
-        blocks = [ca.jacobian(e, s) for e in self._expressions for s in self._symbols]
-        return ca.Function("jacobians", [*self._symbols], blocks)
+        blocks = [ca.jacobian(e, s) for e in self._expressions for s in self.symbols]
+        return ca.Function("jacobians", [*self.symbols], blocks)
 
     @cached_property
     def full(self) -> ca.Function:
         """Kept states -> state of the plant, switched valves as the nominal command leaves them."""
-        x, u = self._symbols
+        x, u = self.symbols
         whole = ca.substitute(self._substituted[0], u, ca.DM(self.plant.nominal[0]))
         return ca.Function("full", [x], [whole])
 
     @cached_property
     def full_under(self) -> ca.Function:
         """(x, u) -> state of the plant, where the command has stood for long."""
-        return ca.Function("full_under", [*self._symbols], [self._substituted[0]])
+        return ca.Function("full_under", [*self.symbols], [self._substituted[0]])
 
     def quantities(self, *names: str) -> ca.Function:
         """(x, u) -> the named quantities of the reduced plant, shape (n, 1)."""
         read = [ca.SX(self.plant.model.conditions.read(name)) for name in names]
-        values = self._reduced([ca.vertcat(*read)])
-        return ca.Function("quantities", [*self._symbols], values)
+        values = self.reduced([ca.vertcat(*read)])
+        return ca.Function("quantities", [*self.symbols], values)
 
     @property
-    def _symbols(self) -> tuple[ca.SX, ca.SX]:
+    def symbols(self) -> tuple[ca.SX, ca.SX]:
+        """The column vectors x of the kept states, and u."""
         x, u = self.plant.model.symbols[:2]
         kept = [x[self.plant.model.states.index(name)] for name in self.states]
         return ca.vertcat(*kept), u
@@ -124,9 +125,9 @@ class DesignModel:
         """State, rates and outputs of the plant in terms of the kept states and numbers."""
         model = self.plant.model
         rates = coupled_rates(model, self.couplings)
-        return tuple(self._reduced([model.symbols[0], rates, model.outputs]))
+        return tuple(self.reduced([model.symbols[0], rates, model.outputs]))
 
-    def _reduced(self, expressions: list[ca.SX]) -> list[ca.SX]:
+    def reduced(self, expressions: list[ca.SX]) -> list[ca.SX]:
         """Expressions of the plant in terms of the kept states, the commands and numbers."""
         model = self.plant.model
         x, _, d, p = model.symbols
