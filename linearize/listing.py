@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isfinite
 from typing import Any
 
 import numpy as np
 
 from linearize.analysis import ModeReport, analyse, analyse_all, prediction_error
+from linearize.cuts import Level, Region
 from linearize.modes import HybridModel, Mode
 
 
@@ -76,6 +78,8 @@ def document(hybrid: HybridModel) -> list[dict[str, Any]]:
     return [
         {
             "name": mode.name,
+            "region": {name: _region(region) for name, region in mode.box.items()},
+            "guards": [{"weights": {**g.weights}, "offset": g.offset} for g in mode.guards],
             "states": list(mode.state_names),
             "commands": list(mode.command_names),
             "outputs": list(mode.output_names),
@@ -87,6 +91,15 @@ def document(hybrid: HybridModel) -> list[dict[str, Any]]:
         }
         for mode in hybrid.modes
     ]
+
+
+def _region(region: Region) -> dict[str, Any]:
+    """An interval with its ends, none where it is open, or a level; both with their point."""
+    if isinstance(region, Level):
+        return {"label": region.label, "level": region.point}
+    ends = {"lower": region.lower, "upper": region.upper}
+    finite = {key: end if isfinite(end) else None for key, end in ends.items()}
+    return {"label": region.label, **finite, "point": region.point}
 
 
 def _reported(report: ModeReport) -> dict[str, Any]:

@@ -112,7 +112,14 @@ def _reduced(plant: Plant, valves: LeftOut, omitted: tuple[Omission, ...]) -> De
     return DesignModel(
         plant=plant,
         states=STATES,
-        left_out=(valves, *RIGID, *(each.left_out for each in omitted)),
+        left_out=(valves, *RIGID, *(each.left_out for each in omitted), *_slow(plant)),
         nulls=dict(pair for each in omitted for pair in each.nulls(plant)),
         couplings=tuple(couplings(plant)),
     )
+
+
+def _slow(plant: Plant) -> Iterator[LeftOut]:
+    """What a user's plant has besides: each effect whose own state the reduction holds at zero."""
+    for effect in plant.effects:
+        if [*effect.states()] and not isinstance(effect, SolenoidValve):
+            yield LeftOut(effect.name, "without its own state", "no part of a shift of 20 ms")

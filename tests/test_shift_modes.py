@@ -1,10 +1,12 @@
 """The gearbox's modes beyond the paper's matrices: Neutral, valves as inputs, flows for valves."""
 
+import json
+
 import casadi as ca
 import numpy as np
 import pytest
 
-from linearize.listing import table
+from linearize.listing import document, table
 from linearize.shift_modes import gearbox_modes, held_at_neutral, switched_modes, valve_flows
 from linearize.shifting import FLOWS, POSITION, PRESSURES, VELOCITY, shift_model
 from linearize.standard import standard_modes
@@ -104,3 +106,23 @@ def test_the_standard_modes_of_the_gearbox_print_as_a_table(plant):
 
     assert len(lines) == 10
     assert lines[1].startswith("held at Neutral")
+
+
+def test_the_document_tells_where_each_mode_holds(plant):
+    free, switched = (make(plant) for make in (gearbox_modes, switched_modes))
+    entries = json.loads(json.dumps(document(free), allow_nan=False))
+    levels = json.loads(json.dumps(document(switched), allow_nan=False))[0]["region"]
+
+    assert entries[0]["region"][POSITION]["upper"] == pytest.approx(1e-4)
+    assert len(entries[0]["guards"]) == 4
+    assert entries[1]["region"][POSITION]["lower"] is None
+    assert entries[1]["region"][POSITION]["upper"] == 0.0
+    assert levels["valve_1.command"] == {"label": "1 vents", "level": 0.0}
+
+
+def test_what_a_plant_of_ones_own_has_besides_is_listed_too(plant):
+    own = plant.with_values({"friction_thermal.softening_n_k": 0.5})
+    hybrid = gearbox_modes(own)
+
+    assert [item.what for item in hybrid.model.left_out][-1] == "friction_thermal"
+    assert pytest.approx(gearbox_modes(plant).modes[1].A) == hybrid.modes[1].A
