@@ -134,7 +134,7 @@ def sampled_hybrid(hybrid: HybridModel, sample_time_s: float) -> SampledHybrid:
     return SampledHybrid(
         hybrid=hybrid,
         sample_time_s=sample_time_s,
-        steps=np.array([_step(hybrid, mode, sample_time_s) for mode in hybrid.modes]),
+        steps=np.array([whole_step(hybrid, mode, sample_time_s) for mode in hybrid.modes]),
         lower=boxes[:, :, 0],
         upper=boxes[:, :, 1],
         columns=np.array([names.index(name) for name in signals], dtype=int),
@@ -162,7 +162,7 @@ def _guards(modes: Sequence[Mode], names: tuple[str, ...]) -> np.ndarray:
     return rows
 
 
-def _step(hybrid: HybridModel, mode: Mode, sample_time_s: float) -> np.ndarray:
+def whole_step(hybrid: HybridModel, mode: Mode, sample_time_s: float) -> np.ndarray:
     """[F G offset] over all states and commands: what the mode holds stays, its rates are zero."""
     step, model = sampled(mode, sample_time_s), hybrid.model
     names = (*model.states, *model.commands)

@@ -1,0 +1,21 @@
+"""The recorded manoeuvres that ship with the project, gone through by the drive's own model."""
+
+from functools import cache
+from pathlib import Path
+
+import studies.demo
+from linearize.reduction import design_model
+from linearize.visited import Visited, visited
+from workbench.comparison.run import run
+from workbench.reading import read_recording
+from workbench.rig import load_rig
+
+FOLDER = Path(studies.demo.__file__).parent / "demo_data"
+
+
+@cache
+def gone_through(name: str) -> Visited:
+    """What the drive visits under the recorded commands of ``train`` or ``validation``."""
+    rig = load_rig(FOLDER / "rig.toml")
+    simulated = run(rig, read_recording(rig, FOLDER / f"{name}.csv"))
+    return visited(design_model(rig.plant), rig.plant.lean(), simulated)
