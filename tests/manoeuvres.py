@@ -1,7 +1,6 @@
 """The recorded manoeuvres that ship with the project, gone through by the drive's own model."""
 
 from functools import cache
-from pathlib import Path
 
 import studies.demo
 from linearize.reduction import design_model
@@ -10,7 +9,7 @@ from workbench.comparison.run import run
 from workbench.reading import read_recording
 from workbench.rig import load_rig
 
-FOLDER = Path(studies.demo.__file__).parent / "demo_data"
+FOLDER = studies.demo.DATA
 
 
 @cache
