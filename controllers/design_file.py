@@ -18,7 +18,7 @@ import numpy as np
 from controllers import CONTROLLERS
 from controllers.spec import replaced
 from linearize.modes import HybridModel
-from linearize.standard import standard_modes
+from linearize.standard import slide_modes
 from workbench.contracts import Controller
 from workbench.errors import Message, UnknownNameError, listed, nearest, whole_file
 from workbench.plant import Plant
@@ -58,7 +58,7 @@ def design(method: str, plant: Plant, numbers: Mapping[str, Any] | None = None) 
         raise UnknownNameError(Message(what, nearest=nearest(method, CONTROLLERS)))
     found = CONTROLLERS[method]
     spec = replaced(found.spec(), numbers or {}, method)
-    hybrid = standard_modes(plant)
+    hybrid = slide_modes(plant)
     return Design(method, plant, spec, hybrid, found.design(hybrid, spec))
 
 

@@ -12,6 +12,7 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
+from linearize.analysis import require_controllable
 from linearize.modes import HybridModel, Mode
 from linearize.reduction import closed_command
 from linearize.standard import COMMAND, POSITION, VELOCITY
@@ -68,7 +69,15 @@ def driven_modes(hybrid: HybridModel) -> tuple[list[Mode], list[Mode]]:
 
 
 def scheduled(hybrid: HybridModel, design: Callable[[Mode], Design]) -> Schedule[Design]:
-    """The same design method on every driven mode."""
+    """The same design method on every driven mode.
+
+    Raises
+    ------
+    InputError
+        If the command cannot steer one of them.
+    """
     forward, backward = driven_modes(hybrid)
+    for mode in (*forward, *backward):
+        require_controllable(mode)
     points = np.array([mode.box[POSITION].point for mode in forward])
     return Schedule(points, tuple(map(design, forward)), tuple(map(design, backward)))

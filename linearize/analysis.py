@@ -10,8 +10,10 @@ import numpy as np
 from linearize.discrete import sampled
 from linearize.modes import HybridModel, Mode
 from linearize.reduction import DesignModel
+from workbench.errors import InputError, Message, listed
 
 RANK_TOLERANCE = 1e-6
+UNREACHED = 1e-12  # of the largest singular value: what rounding leaves of nothing
 
 
 @dataclass(frozen=True)
@@ -68,17 +70,44 @@ def analyse_all(hybrid: HybridModel) -> tuple[ModeReport, ...]:
     return tuple(analyse(mode) for mode in hybrid.modes)
 
 
+def require_controllable(mode: Mode) -> None:
+    """Refuse a mode that the commands cannot steer as a whole, before a design on it.
+
+    Raises
+    ------
+    InputError
+        Naming the states that stay out of reach.
+    """
+    A, B, _ = mode.scaled
+    directions, values = _krylov(A, B)
+    missed = directions[:, values <= UNREACHED]
+    if missed.shape[1]:
+        out = np.linalg.norm(missed, axis=1) > 1e-3
+        states = [name for name, beyond in zip(mode.state_names, out, strict=True) if beyond]
+        rank = len(A) - missed.shape[1]
+        what = f"not controllable: its commands reach {rank} of {len(A)} directions of the state"
+        commands = listed(mode.command_names) or "no command"
+        expected = f"a mode in which {commands} can steer {listed(states)}"
+        raise InputError(Message(what, f"mode '{mode.name}'", expected))
+
+
 def _krylov_values(A: np.ndarray, B: np.ndarray) -> np.ndarray:
     """Singular values of [B, AB, ...] over the largest; zeros where B vanishes."""
-    size, entering = max(np.linalg.norm(A, 2), 1e-12), np.linalg.norm(B, axis=0)
+    return _krylov(A, B)[1]
+
+
+def _krylov(A: np.ndarray, B: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Left singular vectors, (n, n), and values over the largest, (n,), of [B, AB, ...]."""
+    n, size, entering = len(A), max(np.linalg.norm(A, 2), 1e-12), np.linalg.norm(B, axis=0)
     block = B[:, entering > 0] / entering[entering > 0]
     if not block.size:
-        return np.zeros(len(A))
+        return np.eye(n), np.zeros(n)
     blocks = [block]
-    for _ in range(len(A) - 1):
+    for _ in range(n - 1):
         blocks.append(A @ blocks[-1] / size)
-    values = np.linalg.svd(np.hstack(blocks), compute_uv=False)[: len(A)]
-    return values / values[0]
+    directions, values, _ = np.linalg.svd(np.hstack(blocks))
+    values = np.pad(values, (0, n - len(values)))
+    return directions, values / values[0]
 
 
 def prediction_error(
@@ -92,18 +121,21 @@ def prediction_error(
     """Largest error of the mode against the whole plant over a horizon, by state, shape (n_x,).
 
     Both start at the mode's point and get its command plus ``command_change``, shape (n_u,).  The
-    plant is the full one behind the dead zone, gas masses included and friction without bristle.
+    plant is that of the design model with all its states and effects: a servo drive behind the dead
+    zone with its gas masses, a gearbox with contact and dry friction under the same flows.
     """
     plant, step = model.plant, model.plant.model.step(sample_time_s)
     command = mode.command + np.array([*command_change])
-    point = dict(zip(mode.state_names, mode.state, strict=True))
+    sent = mode.sent(model, command)
+    held = {name: region.point for name, region in mode.box.items()}
+    point = held | dict(zip(mode.state_names, mode.state, strict=True))
     kept = [point.get(n, v) for n, v in zip(model.states, model.initial, strict=True)]
-    x, small = model.full(kept), sampled(mode, sample_time_s)
+    x, small = model.full_under(kept, mode.sent(model, mode.command)), sampled(mode, sample_time_s)
     _, d, p = plant.nominal
     rows = [plant.model.states.index(name) for name in mode.state_names]
     linear, worst = mode.state.copy(), np.zeros(len(rows))
     for _ in range(round(horizon_s / sample_time_s)):
-        x = step(x, command, d, p)
+        x = step(x, sent, d, p)
         linear = small.F @ linear + small.G @ command + small.offset
         worst = np.maximum(worst, np.abs(x.full().ravel()[rows] - linear))
     return worst

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from linearize.reduction import DesignModel
+from workbench.plant import require
 
 STEPS, TOLERANCE = 60, 1e-9
 
@@ -42,10 +43,13 @@ def operating_point(
     ------
     ValueError
         If there are not as many free values as rates, or no solution is found.
+    UnknownNameError
+        If a name is neither a state nor a command.
     """
     if len(free) != len(vanish):
         raise ValueError(f"{len(free)} free values for {len(vanish)} rates that vanish")
     names = (*model.states, *model.commands)
+    require((*given, *free, *vanish), names, model.plant.name)
     values = np.concatenate([model.initial, model.plant.nominal[0]])
     values = np.array([given.get(n, v) for n, v in zip(names, values, strict=True)])
     n, rows = len(model.states), [model.states.index(name) for name in vanish]

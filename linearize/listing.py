@@ -2,28 +2,43 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from math import isfinite
 from typing import Any
 
 import numpy as np
 
 from linearize.analysis import ModeReport, analyse, analyse_all, prediction_error
+from linearize.cuts import Level, Region
 from linearize.modes import HybridModel, Mode
 
-TRIED_V, TRIED_S = 0.02, 0.1  # change of the command and horizon of the error against the plant
+
+@dataclass(frozen=True)
+class Trial:
+    """A step of the commands, how long the mode follows it beside the plant, and the sampling."""
+
+    change: float
+    horizon_s: float
+    sample_time_s: float
+
+
+TRIALS = {"_v": Trial(0.02, 0.1, 1e-3), "_kg_s": Trial(1e-4, 2e-3, 1e-4)}  # by unit of the command
+UNDRIVEN = Trial(0.0, 2e-3, 1e-4)  # a switched valve, and no command
 
 
 def table(hybrid: HybridModel) -> str:
     """One line per mode: command, poles, swing, ranks, drift, and error against the plant."""
+    wide = max(28, *(len(mode.name) + 1 for mode in hybrid.modes))
     head = (
-        f"{'mode':<28}{'command':>9}{'Hz':>7}{'damping':>9}{'contr':>7}{'obs':>5}"
+        f"{'mode':<{wide}}{'command':>9}{'Hz':>7}{'damping':>9}{'contr':>7}{'obs':>5}"
         f"{'drift 1/s':>11}{'error %':>9}  poles 1/s"
     )
     lines = [head]
     for mode, report in zip(hybrid.modes, analyse_all(hybrid), strict=True):
-        poles = "  ".join(_pole(value) for value in report.poles if value.imag >= 0.0)
+        poles = "  ".join(map(_pole, _upper(report.poles)))
         n = len(mode.state_names)
         lines.append(
-            f"{mode.name:<28}{mode.command[0]:>9.3f}{report.frequency_hz:>7.2f}"
+            f"{mode.name:<{wide}}{_first(mode.command):>9}{report.frequency_hz:>7.2f}"
             f"{report.damping:>9.2f}{f'{report.controllable}/{n}':>7}{f'{report.observable}/{n}':>5}"
             f"{report.drift:>11.2f}{100.0 * error_share(hybrid, mode):>9.2f}  {poles}"
         )
@@ -37,10 +52,25 @@ def left_out(hybrid: HybridModel) -> str:
 
 
 def error_share(hybrid: HybridModel, mode: Mode) -> float:
-    """Largest error against the plant over 0.1 s after a small step, over the state's scale."""
-    change = np.full(len(mode.command_names), TRIED_V)
-    errors = prediction_error(hybrid.model, mode, change, horizon_s=TRIED_S)
+    """Largest error against the plant after a small step, over the state's scale."""
+    trial = trial_of(mode)
+    change = np.full(len(mode.command_names), trial.change)
+    errors = prediction_error(
+        hybrid.model,
+        mode,
+        change,
+        horizon_s=trial.horizon_s,
+        sample_time_s=trial.sample_time_s,
+    )
     return float((errors / mode.scale).max())
+
+
+def trial_of(mode: Mode) -> Trial:
+    """What the error of a mode is measured with."""
+    units = (
+        unit for unit in TRIALS if mode.command_names[:1] and mode.command_names[0].endswith(unit)
+    )
+    return TRIALS.get(next(units, ""), UNDRIVEN)
 
 
 def document(hybrid: HybridModel) -> list[dict[str, Any]]:
@@ -48,6 +78,8 @@ def document(hybrid: HybridModel) -> list[dict[str, Any]]:
     return [
         {
             "name": mode.name,
+            "region": {name: _region(region) for name, region in mode.box.items()},
+            "guards": [{"weights": {**g.weights}, "offset": g.offset} for g in mode.guards],
             "states": list(mode.state_names),
             "commands": list(mode.command_names),
             "outputs": list(mode.output_names),
@@ -61,6 +93,15 @@ def document(hybrid: HybridModel) -> list[dict[str, Any]]:
     ]
 
 
+def _region(region: Region) -> dict[str, Any]:
+    """An interval with its ends, none where it is open, or a level; both with their point."""
+    if isinstance(region, Level):
+        return {"label": region.label, "level": region.point}
+    ends = {"lower": region.lower, "upper": region.upper}
+    finite = {key: end if isfinite(end) else None for key, end in ends.items()}
+    return {"label": region.label, **finite, "point": region.point}
+
+
 def _reported(report: ModeReport) -> dict[str, Any]:
     return {
         "poles": [[float(value.real), float(value.imag)] for value in report.poles],
@@ -71,6 +112,16 @@ def _reported(report: ModeReport) -> dict[str, Any]:
         "controllable": report.controllable,
         "observable": report.observable,
     }
+
+
+def _first(command: np.ndarray) -> str:
+    return f"{command[0]:.4g}" if len(command) else "-"
+
+
+def _upper(poles: np.ndarray) -> np.ndarray:
+    """Poles without the conjugate half; what rounding leaves of a zero is zero."""
+    shown = np.where(np.abs(poles) < 1e-9 * np.abs(poles).max(initial=0.0), 0.0, poles)
+    return shown[shown.imag >= 0.0]
 
 
 def _pole(value: complex) -> str:

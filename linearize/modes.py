@@ -2,7 +2,7 @@
 
 Paper 003, Sec. V, reduces its plant to 2 x 2 x 2 = 8 modes: two sides of the piston stroke, two
 states for each valve.  :func:`hybrid_modes` does the same for any plant: each signal is cut into
-intervals, and every combination of intervals is a mode.
+intervals, a switched command into its levels, and every combination of them is a mode.
 
 A mode says how friction enters it.  Sliding, the velocity at the point fixes the direction, so
 that dry friction is a constant of the drift and only its slope stands in A.  Sticking, position
@@ -11,36 +11,27 @@ and velocity are held and leave the model.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from linearize.cuts import Guard, Interval, Level, Region, checked
 from linearize.equilibrium import OperatingPoint, operating_point
 from linearize.reduction import DesignModel, design_model
+from workbench.errors import InputError, Message
 from workbench.plant import Plant
 
 if TYPE_CHECKING:
     import control
 
-Placing = Callable[[DesignModel, Mapping[str, "Interval"]], OperatingPoint]
+__all__ = ["Guard", "HybridModel", "Interval", "Level", "Mode", "hybrid_modes"]
+
+Box = Mapping[str, Region]
+Placing = Callable[[DesignModel, Box], OperatingPoint]
 """Finds the point of a box."""
-
-
-@dataclass(frozen=True)
-class Interval:
-    """Part of a signal's range, and the value inside it where the plant is linearised.
-
-    ``holds`` names states that do not move in it: a slide that sticks has no velocity.
-    """
-
-    label: str
-    lower: float
-    upper: float
-    point: float
-    holds: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -50,7 +41,7 @@ class Mode:
     dx/dt = drift + A (x - state) + B (u - command),   y = output + C (x - state) + D (u - command)
 
     The point need not be an equilibrium; ``drift`` is zero where it is one.  Commands are those
-    behind the dead zone.
+    behind the dead zone; a switched one is no input, since its level belongs to the box.
 
     Attributes
     ----------
@@ -60,10 +51,12 @@ class Mode:
         The point, shapes (n_x,), (n_u,), (n_y,) and (n_x,).
     scale
         Typical size of each state, shape (n_x,).
+    guards
+        What must hold besides the box.
     """
 
     name: str
-    box: Mapping[str, Interval]
+    box: Box
     state_names: tuple[str, ...]
     command_names: tuple[str, ...]
     output_names: tuple[str, ...]
@@ -76,10 +69,12 @@ class Mode:
     output: np.ndarray
     drift: np.ndarray
     scale: np.ndarray
+    guards: tuple[Guard, ...] = ()
 
     def holds(self, signals: Mapping[str, float]) -> bool:
-        """True when every signal lies inside the box."""
-        return all(i.lower <= signals[name] < i.upper for name, i in self.box.items())
+        """True when every signal lies inside the box, and every guard holds."""
+        inside = all(region.contains(signals[name]) for name, region in self.box.items())
+        return inside and all(guard.holds(signals) for guard in self.guards)
 
     @property
     def scaled(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -89,7 +84,15 @@ class Mode:
 
     @property
     def system(self) -> control.StateSpace:
-        """The linear part with named signals; python-control takes no dot, so it is a colon."""
+        """The linear part in SI units with named signals; each dot of a name is a colon."""
+        return self._system(self.A, self.B, self.C)
+
+    @property
+    def scaled_system(self) -> control.StateSpace:
+        """The linear part with every state in units of its scale, inputs and outputs in SI."""
+        return self._system(*self.scaled)
+
+    def _system(self, A: np.ndarray, B: np.ndarray, C: np.ndarray) -> control.StateSpace:
         import control
 
         labels = {
@@ -97,7 +100,12 @@ class Mode:
             "inputs": _labels(self.command_names),
             "outputs": _labels(self.output_names),
         }
-        return control.ss(self.A, self.B, self.C, self.D, name=self.name, **labels)
+        return control.ss(A, B, C, self.D, name=self.name, **labels)
+
+    def sent(self, model: DesignModel, command: np.ndarray) -> np.ndarray:
+        """All commands of the model: the mode's own, and switches at their level."""
+        own = dict(zip(self.command_names, command, strict=True))
+        return np.array([own[n] if n in own else self.box[n].point for n in model.commands])
 
     def rates(self, state: np.ndarray, command: np.ndarray) -> np.ndarray:
         """dx/dt of the affine model, shape (n_x,)."""
@@ -106,7 +114,10 @@ class Mode:
 
 @dataclass(frozen=True)
 class HybridModel:
-    """A plant as a set of modes of its design model that together cover its operating range."""
+    """A plant as a set of modes of its design model that together cover its operating range.
+
+    Where several modes hold, the first of them is the active one.
+    """
 
     plant: Plant
     model: DesignModel
@@ -133,44 +144,131 @@ class HybridModel:
         raise LookupError(f"no mode of {self.model.plant.name} covers {dict(signals)}")
 
 
-def at_points(model: DesignModel, box: Mapping[str, Interval]) -> OperatingPoint:
+def at_points(model: DesignModel, box: Box) -> OperatingPoint:
     """Each cut signal at its interval's point, all else at its initial value."""
-    return operating_point(model, {name: interval.point for name, interval in box.items()})
+    return operating_point(model, {name: region.point for name, region in box.items()})
+
+
+def placed_at(values: Mapping[str, float]) -> Placing:
+    """Each cut signal at its interval's point, these at the values given, all else initial."""
+
+    def placed(model: DesignModel, box: Box) -> OperatingPoint:
+        return operating_point(model, {**values, **{name: r.point for name, r in box.items()}})
+
+    return placed
 
 
 def hybrid_modes(
-    plant: Plant, cuts: Mapping[str, Iterable[Interval]], placing: Placing = at_points
+    plant: Plant,
+    cuts: Mapping[str, Iterable[Region]],
+    placing: Placing = at_points,
+    model: DesignModel | None = None,
 ) -> HybridModel:
-    """One mode for every combination of intervals, each linearised where ``placing`` says."""
-    model = design_model(plant)
-    boxes = (dict(zip(cuts, intervals, strict=True)) for intervals in product(*cuts.values()))
-    return HybridModel(
-        plant, model, tuple(linearised(model, box, placing(model, box)) for box in boxes)
-    )
+    """One mode for every combination of intervals and levels.
+
+    Each is linearised where ``placing`` says, with the derivatives of the plant's one model.
+
+    Parameters
+    ----------
+    plant
+        The plant that the modes are to stand for.
+    cuts
+        Intervals of a state or a continuous command, levels of a switched one, by signal.
+    placing
+        Gives the operating point of a box; it need not be an equilibrium.
+    model
+        The reduction of the plant that is linearised; :func:`design_model` of it by default.
+
+    Raises
+    ------
+    InputError
+        If a signal is unknown, an interval is empty, intervals of a signal leave a gap or overlap,
+        a point lies outside its interval, or a switch lacks a level.
+    """
+    model = model or design_model(plant)
+    regions = checked(model, cuts)
+    boxes = [dict(zip(regions, taken, strict=True)) for taken in product(*regions.values())]
+    points = [placing(model, box) for box in boxes]
+    return HybridModel(plant, model, linearised_all(model, boxes, points))
 
 
-def linearised(model: DesignModel, box: Mapping[str, Interval], point: OperatingPoint) -> Mode:
+def linearised(model: DesignModel, box: Box, point: OperatingPoint) -> Mode:
     """The mode of a box at a point, by exact Jacobians."""
-    A, B, C, D = (block.full() for block in model.jacobians(point.state, point.command))
-    output = model.f(point.state, point.command)[1].full().ravel()
-    held = {name for interval in box.values() for name in interval.holds}
-    kept = [i for i, name in enumerate(model.states) if name not in held]
+    return linearised_all(model, [box], [point])[0]
+
+
+def linearised_all(
+    model: DesignModel, boxes: Sequence[Box], points: Sequence[OperatingPoint]
+) -> tuple[Mode, ...]:
+    """The modes of boxes at their points; all Jacobians come from one call.
+
+    Raises
+    ------
+    InputError
+        If a point lies outside its box, or the plant has no finite derivative there.
+    """
+    if not boxes:
+        return ()
+    states = np.column_stack([point.state for point in points])
+    commands = np.column_stack([point.command for point in points])
+    found = [block.full() for block in (*model.jacobians(states, commands),)]
+    outputs = model.f(states, commands)[1].full().T
+    blocks = zip(*(np.split(block, len(boxes), axis=1) for block in found), strict=True)
+    made = (_mode(model, *each) for each in zip(boxes, points, blocks, outputs, strict=True))
+    return tuple(made)
+
+
+def _mode(
+    model: DesignModel,
+    box: Box,
+    point: OperatingPoint,
+    blocks: tuple[np.ndarray, ...],
+    output: np.ndarray,
+) -> Mode:
+    name = " ".join(region.label for region in box.values())
+    _require_inside(model, name, box, point, blocks)
+    held = {state for region in box.values() for state in region.holds}
+    kept = [i for i, state in enumerate(model.states) if state not in held]
+    driven = [i for i, c in enumerate(model.commands) if not isinstance(box.get(c), Level)]
+    A, B, C, D = blocks
     return Mode(
-        name=" ".join(interval.label for interval in box.values()),
+        name=name,
         box=box,
         state_names=tuple(model.states[i] for i in kept),
-        command_names=model.commands,
+        command_names=tuple(model.commands[i] for i in driven),
         output_names=model.measured,
         A=A[np.ix_(kept, kept)],
-        B=B[kept],
+        B=B[np.ix_(kept, driven)],
         C=C[:, kept],
-        D=D,
+        D=D[:, driven],
         state=point.state[kept],
-        command=point.command,
+        command=point.command[driven],
         output=output,
         drift=point.rates[kept],
         scale=model.scale[kept],
     )
+
+
+def _require_inside(
+    model: DesignModel,
+    name: str,
+    box: Box,
+    point: OperatingPoint,
+    blocks: tuple[np.ndarray, ...],
+) -> None:
+    values = (*point.state, *point.command)
+    at = dict(zip((*model.states, *model.commands), values, strict=True))
+    wrong = [
+        Message(
+            f"the point of mode '{name}' is at {at[signal]:g}, outside '{region.label}'", signal
+        )
+        for signal, region in box.items()
+        if not region.contains(at[signal])
+    ]
+    if not all(np.isfinite(block).all() for block in blocks):
+        wrong.append(Message("the plant has no finite derivative at the point", f"mode '{name}'"))
+    if wrong:
+        raise InputError(*wrong)
 
 
 def _labels(names: tuple[str, ...]) -> list[str]:

@@ -8,18 +8,22 @@ can be printed, and undone one line at a time.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import casadi as ca
 import numpy as np
 
+from linearize.coupling import RigidCoupling, coupled_rates
+from workbench.effect import Expression
 from workbench.effects.bristle_friction import BristleFriction
 from workbench.effects.sensor_response import SensorLag
+from workbench.effects.solenoid_valve import SolenoidValve
 from workbench.effects.supply_droop import SupplyDroop
 from workbench.effects.valve_command import CommandDelay, DeadZone, ValveLag, ValveOffset
 from workbench.effects.valve_hysteresis import ValveHysteresis
+from workbench.floating_piston import ControlChamber
 from workbench.plant import Plant
 
 # Effects whose states a design does without.
@@ -42,17 +46,23 @@ class DesignModel:
     Attributes
     ----------
     plant
-        The lean plant with the dead zone and the bristle at null; its commands are those behind
-        the dead zone.
+        The lean plant with the commands of the design: the dead zone and the bristle at null, or
+        flows in place of valves.
     states
         Names of the states that are kept, in order.
     left_out
         What is not in it.
+    nulls
+        Values that differ from the plant's, by ``part.parameter_unit``.
+    couplings
+        Parts that move with a body, and bring no states.
     """
 
     plant: Plant
     states: tuple[str, ...]
     left_out: tuple[LeftOut, ...]
+    nulls: Mapping[str, float] = field(default_factory=dict)
+    couplings: tuple[RigidCoupling, ...] = ()
 
     @property
     def commands(self) -> tuple[str, ...]:
@@ -77,21 +87,35 @@ class DesignModel:
     @cached_property
     def f(self) -> ca.Function:
         """(x, u) -> (dx/dt, y), x the kept states."""
-        return ca.Function("design", [*self._symbols], [*self._expressions])
+        return ca.Function("design", [*self.symbols], [*self._expressions])
 
     @cached_property
     def jacobians(self) -> ca.Function:
         """(x, u) -> (A, B, C, D)."""
-        blocks = [ca.jacobian(e, s) for e in self._expressions for s in self._symbols]
-        return ca.Function("jacobians", [*self._symbols], blocks)
+        blocks = [ca.jacobian(e, s) for e in self._expressions for s in self.symbols]
+        return ca.Function("jacobians", [*self.symbols], blocks)
 
     @cached_property
     def full(self) -> ca.Function:
-        """Kept states -> state of the plant."""
-        return ca.Function("full", [self._symbols[0]], [self._substituted[0]])
+        """Kept states -> state of the plant, switched valves as the nominal command leaves them."""
+        x, u = self.symbols
+        whole = ca.substitute(self._substituted[0], u, ca.DM(self.plant.nominal[0]))
+        return ca.Function("full", [x], [whole])
+
+    @cached_property
+    def full_under(self) -> ca.Function:
+        """(x, u) -> state of the plant, where the command has stood for long."""
+        return ca.Function("full_under", [*self.symbols], [self._substituted[0]])
+
+    def quantities(self, *names: str) -> ca.Function:
+        """(x, u) -> the named quantities of the reduced plant, shape (n, 1)."""
+        read = [ca.SX(self.plant.model.conditions.read(name)) for name in names]
+        values = self.reduced([ca.vertcat(*read)])
+        return ca.Function("quantities", [*self.symbols], values)
 
     @property
-    def _symbols(self) -> tuple[ca.SX, ca.SX]:
+    def symbols(self) -> tuple[ca.SX, ca.SX]:
+        """The column vectors x of the kept states, and u."""
         x, u = self.plant.model.symbols[:2]
         kept = [x[self.plant.model.states.index(name)] for name in self.states]
         return ca.vertcat(*kept), u
@@ -100,15 +124,26 @@ class DesignModel:
     def _substituted(self) -> tuple[ca.SX, ca.SX, ca.SX]:
         """State, rates and outputs of the plant in terms of the kept states and numbers."""
         model = self.plant.model
+        rates = coupled_rates(model, self.couplings)
+        return tuple(self.reduced([model.symbols[0], rates, model.outputs]))
+
+    def reduced(self, expressions: list[ca.SX]) -> list[ca.SX]:
+        """Expressions of the plant in terms of the kept states, the commands and numbers."""
+        model = self.plant.model
         x, _, d, p = model.symbols
-        _, d_nominal, p_nominal = self.plant.nominal
+        _, d_nominal, _ = self.plant.nominal
+        values = {**self.plant.values, **self.nulls}
+        follows = {}
+        for each in self.couplings:
+            follows |= each.stand_ins(model.conditions)
         inside = [name for name in model.states if name not in self.states]
+        stand_ins = [follows.get(n, _stand_in(self.plant, n)) for n in inside]
         old = ca.vertcat(*(x[model.states.index(name)] for name in inside), ca.SX(0, 1))
-        new = ca.vertcat(*(_stand_in(self.plant, name) for name in inside), ca.SX(0, 1))
-        reduced = [x, model.rates, model.outputs]
+        new = ca.vertcat(*stand_ins, ca.SX(0, 1))
         for _ in range(2):  # what stands in for a lag may hold the play before it
-            reduced = ca.substitute(reduced, [old], [new])
-        return tuple(ca.substitute(reduced, [d, p], [ca.DM(d_nominal), ca.DM(p_nominal)]))
+            expressions = ca.substitute(expressions, [old], [new])
+        numbers = [ca.DM(d_nominal), ca.DM(list(values.values()))]
+        return ca.substitute(expressions, [d, p], numbers)
 
     @cached_property
     def _expressions(self) -> tuple[ca.SX, ca.SX]:
@@ -141,21 +176,29 @@ def _passed_over(plant: Plant, state: str) -> bool:
     return quantity == "mass_kg" or isinstance(owner, INSIDE)
 
 
-def _stand_in(plant: Plant, state: str) -> ca.SX:
-    """What takes the place of a state: gas at supply temperature, no lag, no bristle, no droop."""
+def _stand_in(plant: Plant, state: str) -> Expression:
+    """What takes the place of a state that is left out.
+
+    Gas at supply temperature, a control chamber at ambient pressure, an armature where its command
+    drives it; no lag, no bristle, no droop, no warmth.
+    """
     member, _, quantity = state.rpartition(".")
-    if quantity == "lagged_v":
-        return plant.model.conditions[member].entering_v
-    if quantity == "left_share":
-        return plant.model.conditions[member].entering_share
+    now = plant.model.conditions
     owner = next(m for m in plant.members if m.name == member)
+    if quantity == "mass_kg":
+        gas, room_k = now[member], now["supply"].temperature_k
+        return gas.pressure_pa * gas.volume_m3 / (gas.gas_constant_j_kg_k * room_k)
+    if quantity == "lagged_v":
+        return now[member].entering_v
+    if quantity == "left_share":
+        return now[member].entering_share
     if isinstance(owner, SensorLag):
-        return plant.model.conditions.read(owner.signal) / owner.unit
-    if quantity != "mass_kg":
-        return ca.SX(0.0)
-    gas = plant.model.conditions[member]
-    room_k = plant.model.conditions["supply"].temperature_k
-    return gas.pressure_pa * gas.volume_m3 / (gas.gas_constant_j_kg_k * room_k)
+        return now.read(owner.signal) / owner.unit
+    if isinstance(owner, SolenoidValve):
+        return now[member].command * owner.driven()[quantity]
+    if isinstance(owner, ControlChamber):
+        return now["atmosphere"].pressure_pa
+    return ca.SX(0.0)
 
 
 def _left_out(plant: Plant) -> Iterator[LeftOut]:

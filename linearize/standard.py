@@ -8,6 +8,7 @@ from math import inf
 from linearize.equilibrium import OperatingPoint, operating_point
 from linearize.modes import HybridModel, Interval, hybrid_modes
 from linearize.reduction import DesignModel, closed_command
+from linearize.shift_modes import gearbox_modes
 from workbench.effects.forces import EndStops
 from workbench.errors import UnknownNameError
 from workbench.plant import Plant
@@ -88,7 +89,10 @@ def _servo_drive(plant: Plant) -> HybridModel:
     return hybrid_modes(plant, servo_drive_cuts(plant), servo_drive_point)
 
 
-STANDARD_MODES: dict[str, Callable[[Plant], HybridModel]] = {"servo_drive": _servo_drive}
+SLIDE_MODES: dict[str, Callable[[Plant], HybridModel]] = {"servo_drive": _servo_drive}
+"""Plants with a slide behind a proportional valve, which the controllers are designed on."""
+
+STANDARD_MODES: dict[str, Callable[[Plant], HybridModel]] = SLIDE_MODES | {"gearbox": gearbox_modes}
 
 
 def standard_modes(plant: Plant) -> HybridModel:
@@ -99,7 +103,24 @@ def standard_modes(plant: Plant) -> HybridModel:
     UnknownNameError
         If its kind has none.
     """
-    if plant.name not in STANDARD_MODES:
-        known = ", ".join(STANDARD_MODES)
-        raise UnknownNameError(f"no standard modes for {plant.name}; there are some for {known}")
-    return STANDARD_MODES[plant.name](plant)
+    return _among(STANDARD_MODES, plant, "no standard modes for")
+
+
+def slide_modes(plant: Plant) -> HybridModel:
+    """The standard modes of a plant whose slide a controller is to position.
+
+    Raises
+    ------
+    UnknownNameError
+        If it has no such slide.
+    """
+    return _among(SLIDE_MODES, plant, "no modes to position a slide with for")
+
+
+def _among(
+    known: dict[str, Callable[[Plant], HybridModel]], plant: Plant, none: str
+) -> HybridModel:
+    if plant.name not in known:
+        names = ", ".join(known)
+        raise UnknownNameError(f"{none} {plant.name}; there are some for {names}")
+    return known[plant.name](plant)

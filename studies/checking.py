@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from controllers.design_file import read_design
-from linearize.standard import STANDARD_MODES
+from linearize.standard import SLIDE_MODES
 from studies.closed_loop_check import Check, check
 from studies.closed_loop_figures import check_figures
 from studies.figures.style import styled
@@ -68,8 +68,8 @@ def check_rig(
 def _controllers(rig: Rig, designs: Iterable[Path]) -> dict[str, Controller]:
     """The controllers of design files by the file's name; warns where they are for other values."""
     name = rig.plant.name
-    if name not in STANDARD_MODES:
-        expected = f"a rig of {listed(STANDARD_MODES)}"
+    if name not in SLIDE_MODES:
+        expected = f"a rig of {listed(SLIDE_MODES)}"
         raise InputError(Message(f"{name} has no standard modes to control", rig.name, expected))
     read = {path: read_design(path) for path in designs}
     wrong = [

@@ -18,14 +18,25 @@ if TYPE_CHECKING:
 
 
 def export_modes(hybrid: HybridModel, folder: Path, command: str) -> None:
-    """modes.mat, a struct array with A, B, C, D, point and drift; modes.txt; poles.*."""
+    """modes.mat, a struct array with A, B, C, D, point and drift; modes.txt; poles.*.
+
+    Of a slide also mode_map.* and step.*: where each mode is active, and the modes through a step
+    of the valve beside the plant.
+    """
+    from linearize.hybrid_simulation import sampled_hybrid
     from linearize.listing import table
+    from linearize.standard import SLIDE_MODES
+    from studies.slide_modes import STEP_S, map_figure, step_figure, step_of
 
     with whole_file(folder / "modes.mat") as unfinished:
         _write_mat(hybrid, unfinished)
     with whole_file(folder / "modes.txt") as unfinished:
         unfinished.write_text(table(hybrid) + "\n", encoding="utf-8")
     save(pole_figure(hybrid), folder / "poles", command)
+    if hybrid.plant.name in SLIDE_MODES:
+        modes = sampled_hybrid(hybrid, STEP_S)
+        save(map_figure(modes), folder / "mode_map", command)
+        save(step_figure(step_of({"modes": hybrid})), folder / "step", command)
 
 
 def _write_mat(hybrid: HybridModel, path: Path) -> None:

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
-from studies import hidden_study, identification_study
+from studies import hidden_study, identification_study, mode_placement, shift_study
 from studies.study import Study
 
 STUDIES: dict[str, Study] = {
-    study.name: study for study in (hidden_study.STUDY, identification_study.STUDY)
+    study.name: study
+    for study in (
+        hidden_study.STUDY,
+        identification_study.STUDY,
+        mode_placement.STUDY,
+        shift_study.STUDY,
+    )
 }

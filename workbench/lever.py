@@ -55,6 +55,7 @@ class Lever(Part):
         own = now[self.name]
         return {
             "arm_m": self.arm_m,
+            "inertia_kg_m2": self.inertia_kg_m2,
             "tip_m": self.arm_m * own.angle_rad,
             "tip_velocity_m_s": self.arm_m * own.velocity_rad_s,
         }

@@ -11,7 +11,7 @@ from studies.figures.style import BLUE, GREEN, ORANGE, PAGE_IN, RED, new_figure,
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from linearize.modes import HybridModel
+    from linearize.modes import HybridModel, Mode
 
 MARKERS = ("o", "s", "^", "D", "v", "x")
 COLOURS = (BLUE, RED, GREEN, ORANGE)
@@ -19,10 +19,10 @@ COLOURS = (BLUE, RED, GREEN, ORANGE)
 
 def pole_figure(hybrid: HybridModel) -> Figure:
     """Poles of every mode: a panel per interval of the first cut, markers for the second."""
-    first, *rest = hybrid.modes[0].box
+    first, *rest = max((mode.box for mode in hybrid.modes), key=len)
     second = rest[0] if rest else first
     panels = list(dict.fromkeys(mode.box[first].label for mode in hybrid.modes))
-    kinds = list(dict.fromkeys(mode.box[second].label for mode in hybrid.modes))
+    kinds = list(dict.fromkeys(_label(mode, second) for mode in hybrid.modes))
     with styled():
         figure = new_figure(PAGE_IN, 2.6)
         axes = figure.subplots(1, len(panels), sharex=True, sharey=True, squeeze=False)[0]
@@ -31,8 +31,10 @@ def pole_figure(hybrid: HybridModel) -> Figure:
                 chosen = [
                     mode
                     for mode in hybrid.modes
-                    if mode.box[first].label == label and mode.box[second].label == kind
+                    if mode.box[first].label == label and _label(mode, second) == kind
                 ]
+                if not chosen:
+                    continue
                 poles = np.concatenate([np.linalg.eigvals(mode.A) for mode in chosen])
                 panel.plot(
                     poles.real,
@@ -45,9 +47,17 @@ def pole_figure(hybrid: HybridModel) -> Figure:
                     label=kind,
                 )
             panel.axvline(0.0, color="0.4", linewidth=0.6)
-            panel.set_title(f"valve: {label}")
+            panel.set_title(f"{first.partition('.')[0].replace('_', ' ')}: {label}")
             panel.set_xlabel("real part (1/s)")
         axes[0].set_ylabel("imaginary part (rad/s)")
-        handles, labels = axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=len(handles))
+        named = {}
+        for panel in axes:
+            handles, labels = panel.get_legend_handles_labels()
+            named |= dict(zip(labels, handles, strict=True))
+        figure.legend(named.values(), named.keys(), loc="outside lower center", ncols=len(named))
     return figure
+
+
+def _label(mode: Mode, signal: str) -> str:
+    """The mode's interval of a signal; a mode that does not mind the signal holds in any."""
+    return mode.box[signal].label if signal in mode.box else "any"

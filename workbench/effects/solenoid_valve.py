@@ -136,10 +136,15 @@ class SolenoidValve(Effect):
         command = seen.get(f"{self.name}.command")
         if command is None:
             return {}
-        steady_a = self.supply_voltage_v / self.coil_resistance_ohm
+        spread = {"current_a": 0.3, "armature_position_m": 0.5e-3}
+        return {key: (command * self.driven()[key], std) for key, std in spread.items()}
+
+    def driven(self) -> dict[str, Expression]:
+        """Own states a long time after the command has come."""
         return {
-            "current_a": (command * steady_a, 0.3),
-            "armature_position_m": (command * self.full_lift_m, 0.5e-3),
+            "current_a": self.supply_voltage_v / self.coil_resistance_ohm,
+            "armature_position_m": self.full_lift_m,
+            "armature_velocity_m_s": 0.0,
         }
 
     def terms(self, now: Conditions) -> Iterator[MassFlow]:

@@ -1,0 +1,91 @@
+"""Parts that move rigidly with a body: which they are, and what remains of their equations.
+
+A contact of 2e7 N/m or a joint of 5e6 N/m makes poles that no design wants.  Without its give the
+two sides move as one, and the forces between them do no work (d'Alembert): nothing is written anew,
+the rates of the one model are added up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import casadi as ca
+
+from workbench.effect import Conditions, Expression
+from workbench.floating_piston import FloatingPiston
+from workbench.lever import Lever
+from workbench.model import Model
+from workbench.plant import Plant
+
+
+@dataclass(frozen=True)
+class RigidCoupling:
+    """A part whose place is a ratio times that of a body.
+
+    x_s = r x,   v_s = r v,   (m + sum r^2 m_s) dv/dt = m a + sum r m_s a_s
+
+    with a and a_s the rates of the two by themselves; forces between them cancel.  The ratio may
+    jump with the place of the body, as that of a piston which is pushed on one side only.
+
+    body        the part that leads
+    position, velocity    states of the part that follows
+    inertia     mass or moment of inertia of it, as quantity of the plant
+    ratio       r, from the plant at one instant
+    """
+
+    body: str
+    position: str
+    velocity: str
+    inertia: str
+    ratio: Callable[[Conditions], Expression]
+
+    def stand_ins(self, now: Conditions) -> dict[str, Expression]:
+        """What takes the place of the two states."""
+        lead, ratio = now[self.body], self.ratio(now)
+        return {self.position: ratio * lead.position_m, self.velocity: ratio * lead.velocity_m_s}
+
+
+def couplings(plant: Plant) -> Iterator[RigidCoupling]:
+    """A floating piston that moves with the body above zero, and levers on the tip of a body."""
+    for part in plant.parts:
+        if isinstance(part, FloatingPiston):
+            yield RigidCoupling(
+                part.pushed_by,
+                f"{part.name}.position_m",
+                f"{part.name}.velocity_m_s",
+                f"{part.name}.moving_mass_kg",
+                _pushed(part.pushed_by),
+            )
+        elif isinstance(part, Lever):
+            yield RigidCoupling(
+                part.tip_body,
+                f"{part.name}.angle_rad",
+                f"{part.name}.velocity_rad_s",
+                f"{part.name}.inertia_kg_m2",
+                _turned(part.name),
+            )
+
+
+def coupled_rates(model: Model, coupled: tuple[RigidCoupling, ...]) -> ca.SX:
+    """dx/dt of the model with the acceleration of each leading body that of all it carries."""
+    rates, now = ca.SX(model.rates), model.conditions
+    for body in dict.fromkeys(each.body for each in coupled):
+        row = model.states.index(f"{body}.velocity_m_s")
+        mass_kg = now[body].moving_mass_kg
+        force_n = mass_kg * model.rates[row]
+        for each in coupled:
+            if each.body == body:
+                ratio, inertia = each.ratio(now), now.read(each.inertia)
+                force_n += ratio * inertia * model.rates[model.states.index(each.velocity)]
+                mass_kg += ratio**2 * inertia
+        rates[row] = force_n / mass_kg
+    return rates
+
+
+def _pushed(body: str) -> Callable[[Conditions], Expression]:
+    return lambda now: ca.if_else(now[body].position_m > 0.0, 1.0, 0.0)
+
+
+def _turned(lever: str) -> Callable[[Conditions], Expression]:
+    return lambda now: 1.0 / now[lever].arm_m

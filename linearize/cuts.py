@@ -1,0 +1,155 @@
+"""Where a plant's range is cut: intervals of signals, levels of switches, and what is wrong there.
+
+Cuts come from a user, so everything wrong with them is said at once, one message for each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from math import isfinite
+
+from linearize.reduction import DesignModel
+from workbench.errors import InputError, Message, listed, nearest
+
+SAME_LEVEL = 1e-6
+
+
+@dataclass(frozen=True)
+class Interval:
+    """Part of a signal's range, and the value inside it where the plant is linearised.
+
+    ``holds`` names states that do not move in it: a slide that sticks has no velocity.
+    """
+
+    label: str
+    lower: float
+    upper: float
+    point: float
+    holds: tuple[str, ...] = ()
+
+    def contains(self, value: float) -> bool:
+        """True from the lower end up to, and without, the upper one."""
+        return self.lower <= value < self.upper
+
+
+@dataclass(frozen=True)
+class Level:
+    """One value of a switched command.
+
+    A switch has no slope: it chooses the mode and is no input inside of it.
+    """
+
+    label: str
+    point: float
+
+    @property
+    def holds(self) -> tuple[str, ...]:
+        """No state: a switch holds nothing."""
+        return ()
+
+    def contains(self, value: float) -> bool:
+        """True at the value."""
+        return abs(value - self.point) <= SAME_LEVEL
+
+
+@dataclass(frozen=True)
+class Guard:
+    """A half-space of signals in which a mode holds: offset + sum of weight * signal >= 0."""
+
+    weights: Mapping[str, float]
+    offset: float
+
+    def holds(self, signals: Mapping[str, float]) -> bool:
+        """True inside of it."""
+        return self.offset + sum(w * signals[name] for name, w in self.weights.items()) >= 0.0
+
+
+Region = Interval | Level
+Cuts = Mapping[str, tuple[Region, ...]]
+
+
+def checked(model: DesignModel, cuts: Mapping[str, Iterable[Region]]) -> Cuts:
+    """The same cuts as tuples, once nothing is wrong with them.
+
+    Raises
+    ------
+    InputError
+        One message for every unknown signal, empty interval, gap, overlap, point outside its
+        interval, label that stands twice, and level that a switch does not have or that is missing.
+    """
+    found = {signal: tuple(regions) for signal, regions in cuts.items()}
+    if wrong := [m for item in found.items() for m in _wrong(model, *item)]:
+        raise InputError(*wrong)
+    return found
+
+
+def _wrong(model: DesignModel, signal: str, regions: tuple[Region, ...]) -> Iterator[Message]:
+    known = (*model.states, *model.commands)
+    if signal not in known:
+        what = f"{model.plant.name} has no such signal to cut"
+        yield Message(what, signal, listed(known), nearest(signal, known))
+        return
+    if not regions:
+        yield Message("is cut into nothing", signal, "at least one interval or level")
+    labels = [region.label for region in regions]
+    for label in dict.fromkeys(label for label in labels if labels.count(label) > 1):
+        yield Message(f"{labels.count(label)} regions are called '{label}'", signal)
+    for region in regions:
+        for name in region.holds:
+            if name not in model.states:
+                what = f"'{region.label}' holds {name}, which is no state"
+                yield Message(what, signal, listed(model.states), nearest(name, model.states))
+    intervals = [region for region in regions if isinstance(region, Interval)]
+    levels = [region for region in regions if isinstance(region, Level)]
+    if levels or _values(model, signal):
+        yield from _wrong_levels(model, signal, levels, intervals)
+    else:
+        yield from _wrong_intervals(signal, intervals)
+
+
+def _wrong_intervals(signal: str, intervals: list[Interval]) -> Iterator[Message]:
+    for part in intervals:
+        span = f"'{part.label}', {part.lower:g} to {part.upper:g},"
+        if not part.lower < part.upper:
+            yield Message(f"{span} is empty", signal, "lower < upper")
+        elif not (isfinite(part.point) and part.contains(part.point)):
+            what = f"the point {part.point:g} lies outside {span.removesuffix(',')}"
+            yield Message(what, signal, "lower <= point < upper")
+    whole = sorted((p for p in intervals if p.lower < p.upper), key=lambda part: part.lower)
+    for left, right in pairwise(whole):
+        if right.lower < left.upper:
+            shared = f"{right.lower:g} to {min(left.upper, right.upper):g}"
+            yield Message(f"'{left.label}' and '{right.label}' overlap from {shared}", signal)
+        elif right.lower > left.upper:
+            gap = f"{left.upper:g} to {right.lower:g}"
+            what = f"nothing covers {gap}, between '{left.label}' and '{right.label}'"
+            yield Message(what, signal)
+
+
+def _wrong_levels(
+    model: DesignModel, signal: str, levels: list[Level], intervals: list[Interval]
+) -> Iterator[Message]:
+    values = _values(model, signal)
+    if signal in model.states:
+        yield Message("a state passes through its values", signal, "intervals instead of levels")
+        return
+    if intervals:
+        named = listed(f"'{part.label}'" for part in intervals)
+        what = f"{named}: a switched command has no intervals"
+        yield Message(what, signal, "a level for each of its values")
+    for level in levels:
+        if not isfinite(level.point) or (values and not any(map(level.contains, values))):
+            expected = " or ".join(f"{value:g}" for value in values) or "a finite value"
+            yield Message(f"'{level.label}' is at {level.point:g}", signal, expected)
+        elif sum(other.contains(level.point) for other in levels) > 1:
+            yield Message(f"'{level.label}' stands at {level.point:g} as another one", signal)
+    for value in values:
+        if not intervals and not any(level.contains(value) for level in levels):
+            yield Message(f"nothing covers {value:g}", signal, "a level for each of its values")
+
+
+def _values(model: DesignModel, signal: str) -> tuple[float, ...]:
+    """The only values of a switched command; none for anything else."""
+    return next((s.levels for s in model.plant.commands if s.name == signal), ())

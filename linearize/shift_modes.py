@@ -1,0 +1,192 @@
+"""The modes of the gearbox actuator: two sides, two valves, and Neutral held from both sides.
+
+Paper 003, Sec. V, has 2 x 2 x 2 = 8.  The ninth, "held at Neutral", is where the main piston rests
+against the floating one: pressure drives it up from below Neutral and down from above.  Without it
+there is no Neutral at all.
+
+Source: paper 003 Sec. V; physics.md 4.2.  The operating points are chosen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from math import inf
+
+import casadi as ca
+import numpy as np
+
+from linearize.cuts import Guard, Interval, Level, Region
+from linearize.equilibrium import operating_point
+from linearize.modes import HybridModel, Mode, hybrid_modes, linearised, placed_at
+from linearize.reduction import DesignModel
+from linearize.shifting import (
+    FLOWS,
+    POSITION,
+    PRESSURES,
+    VELOCITY,
+    shift_model,
+    switched_shift_model,
+)
+from workbench.effects.forces import EndStops
+from workbench.effects.solenoid_valve import SolenoidValve
+from workbench.plant import Plant
+from workbench.plants.gearbox import COMMANDS, MAIN
+
+NEUTRAL_M, NEUTRAL_M_S = 1e-4, 1e-2  # held where it is nearer and slower than this
+BESIDE_M = 1e-9  # to either side of Neutral
+SLIDING_M_S = 0.1  # dry friction is all there: tanh(100)
+
+DIRECTIONS = {
+    VELOCITY: (
+        Interval("towards Low", -inf, 0.0, -SLIDING_M_S),
+        Interval("towards High", 0.0, inf, SLIDING_M_S),
+    )
+}
+"""A cut for a model that keeps dry friction: its sign is that of the direction."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ShiftPoints:
+    """Where the modes of a shift are linearised, besides the place.
+
+    charging_pa      pressure of a chamber whose valve joins it to the supply
+    venting_pa       pressure of one whose valve joins it to the air
+    velocity_m_s     speed of the main piston
+    """
+
+    charging_pa: float = 5e5
+    venting_pa: float = 3e5
+    velocity_m_s: float = 0.0
+
+    @property
+    def by_valve(self) -> tuple[tuple[str, float], tuple[str, float]]:
+        """Label and pressure of a released valve, and of an energised one."""
+        return ("vents", self.venting_pa), ("charges", self.charging_pa)
+
+
+def gearbox_modes(
+    plant: Plant,
+    points: ShiftPoints | None = None,
+    pieces: int = 1,
+    model: DesignModel | None = None,
+) -> HybridModel:
+    """The paper's eight modes with the mass flows as inputs, and the one held at Neutral.
+
+    The flow at a point is what the valve passes at its pressure.  With several ``pieces`` each side
+    has as many operating points; see :func:`side_cut`.
+    """
+    points, model = points or ShiftPoints(), model or shift_model(plant)
+    passed = valve_flows(plant)
+    cuts: dict[str, tuple[Region, ...]] = {POSITION: side_cut(model, pieces)}
+    for number, flow in enumerate(FLOWS):
+        (vents, low_pa), (charges, high_pa) = points.by_valve
+        out_kg_s = float(passed(0.0, low_pa)[number])
+        into_kg_s = float(passed(1.0, high_pa)[number])
+        cuts[flow] = (
+            Interval(f"{number + 1} {vents}", -inf, 0.0, out_kg_s),
+            Interval(f"{number + 1} {charges}", 0.0, inf, into_kg_s),
+        )
+    hybrid = hybrid_modes(plant, cuts, _placing(FLOWS, points), model)
+    return replace(hybrid, modes=(held_at_neutral(model, points), *hybrid.modes))
+
+
+def switched_modes(
+    plant: Plant,
+    points: ShiftPoints | None = None,
+    pieces: int = 1,
+    model: DesignModel | None = None,
+) -> HybridModel:
+    """The eight modes with the commands of the valves, which choose the mode and are no inputs.
+
+    What the valves pass stands in A and in the drift.
+    """
+    points, model = points or ShiftPoints(), model or switched_shift_model(plant)
+    cuts: dict[str, tuple[Region, ...]] = {POSITION: side_cut(model, pieces)}
+    for number, command in enumerate(COMMANDS):
+        labels = (f"{number + 1} {label}" for label, _ in points.by_valve)
+        cuts[command] = tuple(map(Level, labels, (0.0, 1.0)))
+    return hybrid_modes(plant, cuts, _placing(COMMANDS, points), model)
+
+
+def side_cut(model: DesignModel, pieces: int = 1) -> tuple[Interval, ...]:
+    """Low and High side, each in so many pieces over which a volume changes by the same ratio.
+
+    Of the two volumes that is the one that the side shrinks to its dead volume: 1 on the Low side,
+    2 on the High one.  Each point is where that volume is the geometric mean of its piece.
+    """
+    stroke_m = next(float(e.upper_m) for e in model.plant.effects if _ends(e))
+    volume = model.quantities("chamber_1.volume_m3", "chamber_2.volume_m3")
+    cut = []
+    for row, (label, ends_m) in enumerate(
+        {"Low side": (-stroke_m, 0.0), "High side": (0.0, stroke_m)}.items()
+    ):
+        places_m = np.linspace(*ends_m, 1001)
+        state = [np.full(1001, model.initial[0]), np.full(1001, model.initial[1])]
+        x = np.vstack([*state, places_m, 0.0 * places_m])
+        sizes = np.log(volume(x, model.plant.nominal[0]).full()[row])
+        steps = np.interp(np.linspace(0.0, 1.0, 2 * pieces + 1), *_rising(sizes, places_m))
+        ends = (-inf, 0.0) if row == 0 else (0.0, inf)
+        edges = [ends[0], *map(float, steps[2:-1:2]), ends[1]]
+        for k in range(pieces):
+            name = f"{label} {k + 1}/{pieces}" if pieces > 1 else label
+            cut.append(Interval(name, edges[k], edges[k + 1], float(steps[2 * k + 1])))
+    return tuple(cut)
+
+
+def held_at_neutral(model: DesignModel, points: ShiftPoints | None = None) -> Mode:
+    """The ninth mode: x = 0 and v = 0, while F_L >= 0 below Neutral and F_H <= 0 above.
+
+    Both forces are linear in the pressures; they are read off the model on either side.
+    """
+    half_pa = (points or ShiftPoints()).charging_pa
+    box = {POSITION: Interval("held at Neutral", -NEUTRAL_M, NEUTRAL_M, 0.0, (POSITION, VELOCITY))}
+    point = operating_point(model, {**dict.fromkeys(PRESSURES, half_pa), POSITION: 0.0})
+    slow = (Guard({VELOCITY: sign}, NEUTRAL_M_S) for sign in (1.0, -1.0))
+    pushed = (_push(model, sign) for sign in (-1.0, 1.0))
+    return replace(linearised(model, box, point), guards=(*slow, *pushed))
+
+
+def valve_flows(plant: Plant) -> Callable[[float, float], np.ndarray]:
+    """(command, chamber pressure) -> flow through each valve, kg/s, shape (2,)."""
+    model = switched_shift_model(plant)
+    valves = [e for e in model.plant.effects if isinstance(e, SolenoidValve)]
+    flows = [model.plant.model.flows[v.name, "MassFlow", v.chamber] for v in valves]
+    (passed,) = model.reduced([ca.vertcat(*flows)])
+    f = ca.Function("flows", [*model.symbols], [passed])
+
+    def flows_at(command: float, pressure_pa: float) -> np.ndarray:
+        return f([pressure_pa, pressure_pa, 0.0, 0.0], [command, command]).full().ravel()
+
+    return flows_at
+
+
+def _placing(inputs: tuple[str, str], points: ShiftPoints):
+    """Pressures by what the valves do, the speed as given."""
+    pressure_pa = [value for _, value in points.by_valve]
+
+    def placed(model: DesignModel, box: Mapping[str, Region]):
+        charging = [bool(box[name].point > 0.0) for name in inputs]
+        values = {p: pressure_pa[on] for p, on in zip(PRESSURES, charging, strict=True)}
+        return placed_at({VELOCITY: points.velocity_m_s, **values})(model, box)
+
+    return placed
+
+
+def _push(model: DesignModel, side: float) -> Guard:
+    """The force at rest on one side of Neutral, over the mass, towards it."""
+    x = np.array([0.0, 0.0, side * BESIDE_M, 0.0])
+    u = np.zeros(len(model.commands))
+    slope = model.jacobians(x, u)[0].full()[3]
+    offset = float(model.f(x, u)[0][3])
+    weights = {name: -side * float(slope[k]) for k, name in enumerate(PRESSURES)}
+    return Guard(weights, -side * offset)
+
+
+def _rising(values: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Share of the way from the first value to the last one, with the places."""
+    return (values - values[0]) / (values[-1] - values[0]), places
+
+
+def _ends(effect: object) -> bool:
+    return isinstance(effect, EndStops) and effect.body == MAIN

@@ -1,0 +1,125 @@
+"""The gearbox actuator as paper 003, Sec. V, reduces it: 18 states to 4, by a written list.
+
+State (p1, p2, x, v).  Two kinds of input: the two mass flows, as in the paper, or the two valves,
+whose commands then choose the mode.  The plant is the one of the simulation; what is left out of it
+is a null value, a stand-in for a state, or a rigid coupling, one :class:`LeftOut` each.
+
+Source: paper 003 Sec. V.A; physics.md 4.2.  E003-8 and E003-9 (mass and force by side) follow from
+the coupling of the floating piston.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from linearize.coupling import couplings
+from linearize.reduction import DesignModel, LeftOut
+from workbench.effect import Effect
+from workbench.effects.detent import Detent
+from workbench.effects.solenoid_valve import SolenoidValve
+from workbench.effects.stribeck_friction import StribeckFriction
+from workbench.effects.wall_heat import ConstantWallHeat
+from workbench.plant import Plant, Signal
+from workbench.plants.gearbox import FLOATING, MAIN
+from workbench.sources import FlowSource
+
+POSITION, VELOCITY = f"{MAIN}.position_m", f"{MAIN}.velocity_m_s"
+PRESSURES = ("chamber_1.pressure_pa", "chamber_2.pressure_pa")
+STATES = (*PRESSURES, POSITION, VELOCITY)
+FLOWS = ("valve_1.flow_kg_s", "valve_2.flow_kg_s")
+
+
+@dataclass(frozen=True)
+class Omission:
+    """Effects of one kind that the reduction sets to null; keep one by not passing it."""
+
+    kind: type[Effect]
+    strengths: tuple[str, ...]
+    left_out: LeftOut
+
+    def nulls(self, plant: Plant) -> Iterator[tuple[str, float]]:
+        """Name and null of every strength that it takes."""
+        for effect in plant.effects:
+            if isinstance(effect, self.kind):
+                for strength in self.strengths:
+                    yield f"{effect.name}.{strength}", effect.parameters()[strength].null
+
+
+COULOMB = Omission(
+    StribeckFriction,
+    ("coulomb_force_n", "stiction_excess_n", "pressure_factor_n_pa"),
+    LeftOut("dry friction", "viscous part only", "a constant of the direction, without slope"),
+)
+DETENT = Omission(
+    Detent,
+    ("force_n",),
+    LeftOut("detent", "none", "180 N at the piston beside some 1600 N of pressure"),
+)
+HEAT = Omission(
+    ConstantWallHeat,
+    ("coefficient_w_m2_k",),
+    LeftOut("wall heat", "none", "a shift is over in 20 ms"),
+)
+OMITTED = (COULOMB, DETENT, HEAT)
+RIGID = (
+    LeftOut(
+        FLOATING,
+        "at rest while x <= 0, one body with the main piston above",
+        "contact of 2e7 N/m is no part of a design",
+    ),
+    LeftOut("finger", "one body with the main piston", "a joint of 5e6 N/m is no part of a design"),
+    LeftOut("control_chamber.pressure_pa", "ambient pressure", "its port is wide"),
+    LeftOut("mass of gas", "gas at supply temperature", "temperature moves the flow by per cents"),
+)
+SWITCHED = LeftOut("solenoids", "armature at the end its command drives it to", "over in 4 to 7 ms")
+REPLACED = LeftOut("solenoids", "their mass flows as commands", "the input of the paper")
+
+
+def fed_by_flows(plant: Plant) -> Plant:
+    """The same plant with the flow into each chamber as a command in place of its solenoid valve.
+
+    Nothing else changes: it is what a reduced model under the same flows is compared with.
+    """
+    valves = [effect for effect in plant.effects if isinstance(effect, SolenoidValve)]
+    sources = tuple(FlowSource(name=valve.name, chamber=valve.chamber) for valve in valves)
+    gone = {valve.name for valve in valves}
+    switched = {f"{name}.command" for name in gone}
+    kept = [e for e in plant.effects if e.name not in gone]
+    return replace(
+        plant,
+        parts=(*plant.parts, *sources),
+        effects=tuple(e for e in kept if getattr(e, "signal", None) not in switched),
+        commands=tuple(Signal(f"{source.name}.flow_kg_s", nominal=0.0) for source in sources),
+    )
+
+
+def shift_model(plant: Plant, omitted: tuple[Omission, ...] = OMITTED) -> DesignModel:
+    """The gearbox on (p1, p2, x, v), with the two mass flows as commands.
+
+    Without ``COULOMB`` among what is omitted, dry friction stays: at a point that slides it is a
+    constant of the drift, with the sign of the direction.
+    """
+    return _reduced(fed_by_flows(plant.lean()), REPLACED, omitted)
+
+
+def switched_shift_model(plant: Plant, omitted: tuple[Omission, ...] = OMITTED) -> DesignModel:
+    """The gearbox on (p1, p2, x, v), with the commands of the valves, each 0 or 1."""
+    return _reduced(plant.lean(), SWITCHED, omitted)
+
+
+def _reduced(plant: Plant, valves: LeftOut, omitted: tuple[Omission, ...]) -> DesignModel:
+    return DesignModel(
+        plant=plant,
+        states=STATES,
+        left_out=(valves, *RIGID, *(each.left_out for each in omitted), *_slow(plant)),
+        nulls=dict(pair for each in omitted for pair in each.nulls(plant)),
+        couplings=tuple(couplings(plant)),
+    )
+
+
+def _slow(plant: Plant) -> Iterator[LeftOut]:
+    """What a user's plant has besides: each effect whose own state the reduction holds at zero."""
+    for effect in plant.effects:
+        if [*effect.states()] and not isinstance(effect, SolenoidValve):
+            yield LeftOut(effect.name, "without its own state", "no part of a shift of 20 ms")

@@ -1,0 +1,99 @@
+"""What a plant visits in a manoeuvre, and the windows in which its prediction is judged."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from linearize.reduction import DesignModel
+from workbench.called import result
+from workbench.effects.forces import EndStops
+from workbench.plant import Plant
+from workbench.recording import Recording
+
+HORIZON_S = 0.05
+APART_S = 0.02  # between the starts of windows
+
+
+@dataclass(frozen=True)
+class Visited:
+    """States and commands of a design model along a manoeuvre of the full plant.
+
+    states        shape (n_x, n)
+    commands      behind the dead zone, shape (n_u, n)
+    free          where nothing touches an end stop, shape (n,): the modes are those of free motion
+    starts        first sample of each gap-free piece
+    """
+
+    sample_time_s: float
+    states: np.ndarray
+    commands: np.ndarray
+    free: np.ndarray
+    starts: tuple[int, ...]
+
+    @property
+    def rows(self) -> np.ndarray:
+        """States, then commands, at the samples of free motion; shape (n_x + n_u, n_free)."""
+        return np.vstack([self.states, self.commands])[:, self.free]
+
+
+@dataclass(frozen=True)
+class Windows:
+    """Pieces of a manoeuvre side by side, n samples each, the first of which is the start.
+
+    states, commands      shapes (n_x, n, n_w) and (n_u, n, n_w)
+    """
+
+    sample_time_s: float
+    states: np.ndarray
+    commands: np.ndarray
+
+
+def visited(model: DesignModel, plant: Plant, simulated: Recording) -> Visited:
+    """What ``plant`` visits in its own simulation, which holds all of its states.
+
+    The commands of the design model are read off the plant: a command behind its dead zone.
+
+    Raises
+    ------
+    UnknownNameError
+        If a state or a command of the plant is not among the channels.
+    """
+    full = plant.model
+    x, u, d = (
+        simulated.rows(names) for names in (full.states, full.commands, full.measured_inputs)
+    )
+    n = len(simulated)
+    p = np.tile(plant.nominal[2][:, None], n)
+    behind = result(full.quantities(*model.commands).map(n), x, u, np.reshape(d, (-1, n)), p)
+    free = np.ones(n, dtype=bool)
+    for stop in plant.effects:
+        name = f"{stop.body}.position_m" if isinstance(stop, EndStops) else ""
+        if name in simulated.channels:
+            at = simulated[name]
+            free &= (at > float(stop.lower_m)) & (at < float(stop.upper_m))
+    states = simulated.rows(model.states)
+    return Visited(simulated.sample_time_s, states, behind, free, simulated.starts)
+
+
+def windows(seen: Visited, horizon_s: float = HORIZON_S, apart_s: float = APART_S) -> Windows:
+    """Windows of free motion, none across a gap.
+
+    Raises
+    ------
+    ValueError
+        If there is none.
+    """
+    n, apart = round(horizon_s / seen.sample_time_s) + 1, round(apart_s / seen.sample_time_s)
+    ends = (*seen.starts[1:], seen.states.shape[1])
+    firsts = [
+        first
+        for start, end in zip(seen.starts, ends, strict=True)
+        for first in range(start, end - n + 1, max(apart, 1))
+        if seen.free[first : first + n].all()
+    ]
+    if not firsts:
+        raise ValueError(f"no window of {horizon_s:g} s in free motion; the manoeuvre is too short")
+    samples = np.arange(n)[:, None] + np.array(firsts)
+    return Windows(seen.sample_time_s, seen.states[:, samples], seen.commands[:, samples])

@@ -1,0 +1,129 @@
+"""Which mode is active where: over two signals, a panel for each value of the others."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from studies.figures.style import PAGE_IN, new_figure, styled
+from studies.text import labelled
+from workbench.units import display_scale
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from linearize.hybrid_simulation import SampledHybrid
+
+CELLS = 72
+COLOURS = "cividis"
+PALE = 0.55  # of white in the colours, so that numbers can be read on them
+TURN = 0.618  # of the colours between one mode and the next: neighbours differ
+SHOWN = 0.004  # of the cells: smaller regions have no number
+FINE = 0.02  # of the range: a narrower holding interval asks for a logarithmic axis around zero
+TEXT_WIDTH = 105  # letters that a line of the legend takes
+
+Range = tuple[float, float]
+
+
+def mode_map_figure(
+    modes: SampledHybrid,
+    ranges: Mapping[str, Range],
+    panels: Mapping[str, Mapping[str, float]],
+) -> Figure:
+    """The active mode over two signals.
+
+    ``ranges`` names the two signals, across first; ``panels`` gives the values of the others by
+    title, the design model's initial and nominal ones where it says nothing.
+    """
+    from matplotlib.lines import Line2D
+
+    edges = {name: _edges(modes, name, ends) for name, ends in ranges.items()}
+    shown: set[int] = set()
+    with styled():
+        figure = new_figure(PAGE_IN, 4.2)
+        axes = figure.subplots(1, len(panels), sharex=True, sharey=True, squeeze=False)[0]
+        for panel, (title, values) in zip(axes, panels.items(), strict=True):
+            active = _active(modes, edges, values)
+            _drawn(panel, edges, active, len(modes.hybrid.modes))
+            shown |= _numbered(panel, edges, active)
+            panel.set_title(title)
+            panel.set_xlabel(labelled(next(iter(ranges))))
+        axes[0].set_ylabel(labelled([*ranges][1]))
+        lines = [f"{k + 1}  {modes.hybrid.modes[k].name}" for k in sorted(shown)]
+        figure.legend(
+            [Line2D([], [], linestyle="none") for _ in lines],
+            lines,
+            loc="outside lower center",
+            ncols=max(TEXT_WIDTH // (max(map(len, lines)) + 5), 1),
+            handlelength=0.0,
+            handletextpad=0.0,
+        )
+    return figure
+
+
+def _active(
+    modes: SampledHybrid, edges: Mapping[str, np.ndarray], values: Mapping[str, float]
+) -> np.ndarray:
+    """Index of the active mode in every cell, shape (n_down, n_across)."""
+    model = modes.hybrid.model
+    names = (*model.states, *model.commands)
+    usual = dict(zip(names, (*model.initial, *model.plant.nominal[0]), strict=True))
+    across, down = np.meshgrid(*(_middles(each) for each in edges.values()))
+    z = np.tile(np.array([*{**usual, **values}.values(), 1.0]), (across.size, 1))
+    for name, value in zip(edges, (across, down), strict=True):
+        z[:, names.index(name)] = value.ravel()
+    return modes.active(z).reshape(across.shape)
+
+
+def _edges(modes: SampledHybrid, name: str, ends: Range) -> np.ndarray:
+    """Edges of cells over a range, dense around zero where a narrow interval there holds."""
+    near = _near(modes, name)
+    if near >= FINE * (ends[1] - ends[0]):
+        return np.linspace(*ends, CELLS + 1)
+    return near * np.sinh(np.linspace(*np.arcsinh(np.array(ends) / near), CELLS + 1))
+
+
+def _near(modes: SampledHybrid, name: str) -> float:
+    """Half of the narrowest interval in which a signal is held, infinite where it is not."""
+    regions = [mode.box[name] for mode in modes.hybrid.modes if name in mode.box]
+    widths = (region.upper - region.lower for region in regions if region.holds)
+    return min(widths, default=np.inf) / 2.0
+
+
+def _drawn(
+    panel: Axes, edges: Mapping[str, np.ndarray], active: np.ndarray, number_of_modes: int
+) -> None:
+    from matplotlib import colormaps
+    from matplotlib.colors import ListedColormap
+
+    shades = colormaps[COLOURS](TURN * np.arange(number_of_modes) % 1.0) * (1.0 - PALE) + PALE
+    x, y = (display_scale(name).from_si(each) for name, each in edges.items())
+    panel.pcolormesh(
+        x, y, active + 1, cmap=ListedColormap(shades), vmin=1, vmax=number_of_modes, rasterized=True
+    )
+    panel.grid(False)
+    for set_scale, each in ((panel.set_xscale, x), (panel.set_yscale, y)):
+        steps = np.diff(each)
+        if steps.max() > 1.01 * steps.min():
+            set_scale("symlog", linthresh=10.0 * float(steps.min()))
+
+
+def _numbered(panel: Axes, edges: Mapping[str, np.ndarray], active: np.ndarray) -> set[int]:
+    """Numbers in the regions that are large enough, and which those are."""
+    x, y = (_middles(display_scale(name).from_si(each)) for name, each in edges.items())
+    shown = set()
+    for k in np.unique(active):
+        rows, columns = np.nonzero(active == k)
+        if len(rows) > SHOWN * active.size:
+            away = (rows - rows.mean()) ** 2 + (columns - columns.mean()) ** 2
+            place = (x[columns[away.argmin()]], y[rows[away.argmin()]])
+            panel.annotate(str(k + 1), place, ha="center", va="center", fontsize=7)
+            shown.add(int(k))
+    return shown
+
+
+def _middles(edges: np.ndarray) -> np.ndarray:
+    return (edges[1:] + edges[:-1]) / 2.0
