@@ -62,6 +62,16 @@ def test_of_twelve_hidden_effects_ten_come_first_and_all_at_least_in_a_printed_t
     assert all(len(each.diagnosis.ranking[0].tied_with) <= 2 for each in found)
 
 
+@pytest.mark.slow
+def test_a_fit_that_keeps_little_of_what_the_scan_promised_goes_on_from_a_larger_size():
+    """An underlap that the prior fit imitates by a leak and a bent area law, all far off."""
+    found = diagnosed("valve_underlap", ("valve_underlap",))
+    (size,) = found.diagnosis.ranking[0].size.values()
+
+    assert found.place == 1, said([found])
+    assert size.value == pytest.approx(found.case.size, rel=0.15)
+
+
 def droop(found):
     return next(r for r in found.diagnosis.ranking if r.candidate.name.startswith("supply_droop"))
 

@@ -29,6 +29,7 @@ from workbench.fitting.windows import Windows
 STARTS = 2  # sizes of the scan that are tried
 SHARES = (2.0, 1.0, 0.5, 0.0)  # of the linear step of the nuisances that goes with each
 ITERATIONS = 4
+KEPT = 0.5  # of what the scan promised: a first fit that keeps less tries a larger size
 WORTH_TRYING = 5.0  # times the cost of the best start
 FAR = 1.5  # prior deviations: where the base has moved a parameter further, fits begin there too
 
@@ -61,7 +62,36 @@ def rough_fit(problem: Problem, profile: Profile, most: int = STARTS) -> Rough:
         at = None if blind else borrowed(*lent)
         tried.append(fit_windows(windows, unknowns, start, ITERATIONS, at))
     fit = min(tried, key=lambda each: each.cost)
+    if base.cost - fit.cost < KEPT * profile.drop:
+        further = _from_larger(problem, windows, unknowns, profile)
+        fit = min((fit, *further), key=lambda each: each.cost)
     return Rough(profile, fit, (base.cost - fit.cost) / problem.misfit)
+
+
+def _from_larger(
+    problem: Problem, windows: Windows, unknowns: Unknowns, profile: Profile
+) -> list[Fit]:
+    """The fit from the next larger size of the scan, where there is one.
+
+    A fit that keeps little of what the scan promised ended in a valley beside.  The scan is linear
+    in the nuisances: where the base has moved them far to imitate what is missing, the size that
+    it puts first is too small, and at the right one it sees a loss.
+    """
+    best = profile.trials[0]
+    larger = sorted((t for t in profile.trials if _beyond(t, best)), key=lambda t: t.size)
+    if not larger:
+        return []
+    (points,) = _starts(problem, windows, unknowns, replace(profile, trials=(larger[0],)), 1)[:1]
+    start = points_costs(windows, unknowns, points).best
+    return [fit_windows(windows, unknowns, start, 2 * ITERATIONS)]
+
+
+def _beyond(trial: Trial, best: Trial) -> bool:
+    """True for a larger size of the same sign and shape."""
+    strength = best.candidate.strength
+    same = {k: v for k, v in best.values.items() if k != strength}
+    alike = same.items() <= trial.values.items()
+    return alike and trial.size > best.size and trial.values[strength] * best.values[strength] > 0
 
 
 def windows_for(problem: Problem, candidate: Candidate) -> Windows:
