@@ -31,7 +31,7 @@ from linearize.equilibrium import OperatingPoint
 from linearize.hybrid_simulation import ends
 from linearize.modes import Box, HybridModel, Mode, linearised
 from linearize.reduction import DesignModel
-from linearize.visited import Visited
+from linearize.visits import Visited
 from workbench.called import called, result
 
 SAMPLES, CANDIDATES = 2000, 40  # of a manoeuvre; points tried in a box

@@ -15,7 +15,7 @@ from linearize.equilibrium import OperatingPoint
 from linearize.holding import whole_point
 from linearize.hybrid_simulation import SampledHybrid, sampled_hybrid
 from linearize.modes import HybridModel, Mode, linearised
-from linearize.visited import Windows
+from linearize.visits import Windows
 
 FITTED = 5  # every so many samples of a window count in the fit of the single model
 

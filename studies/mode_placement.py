@@ -14,9 +14,9 @@ from linearize.hybrid_simulation import sampled_hybrid
 from linearize.modes import HybridModel
 from linearize.placement import growing_modes
 from linearize.prediction import PredictionError, fitted_single, prediction_of, single_of
+from linearize.regions import Validity, validity
 from linearize.standard import POSITION, VELOCITY, standard_modes
-from linearize.validity import Validity, validity
-from linearize.visited import Windows, visited, windows
+from linearize.visits import Windows, visited, windows
 from studies.demo import DATA
 from studies.figures.prediction import placement_figure, point_figure
 from studies.slide_modes import STEP_S, Step, map_figure, step_figure, step_of

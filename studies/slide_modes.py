@@ -15,7 +15,7 @@ from linearize.hybrid_simulation import HybridRun, SampledHybrid, sampled_hybrid
 from linearize.modes import HybridModel
 from linearize.reduction import closed_command
 from linearize.standard import COMMAND, POSITION, VELOCITY, stroke_m
-from linearize.visited import Visited, visited
+from linearize.visits import Visited, visited
 from studies.figures.mode_maps import mode_map_figure
 from studies.figures.prediction import overlay_figure
 from workbench.effects import DeadZone

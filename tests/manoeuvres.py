@@ -4,7 +4,7 @@ from functools import cache
 
 import studies.demo
 from linearize.reduction import design_model
-from linearize.visited import Visited, visited
+from linearize.visits import Visited, visited
 from workbench.comparison.run import run
 from workbench.reading import read_recording
 from workbench.rig import load_rig

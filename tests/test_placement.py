@@ -11,7 +11,7 @@ from linearize.hybrid_simulation import sampled_hybrid
 from linearize.placement import growing_modes, placed_modes
 from linearize.prediction import fitted_single, prediction_of, single_of
 from linearize.standard import COMMAND, POSITION, VELOCITY, standard_modes
-from linearize.visited import windows
+from linearize.visits import windows
 from workbench.plants.servo_drive import STROKE_M, servo_drive
 
 STEP_S = 1e-3

@@ -10,9 +10,9 @@ from linearize.discrete import sampled
 from linearize.equilibrium import operating_point
 from linearize.modes import linearised
 from linearize.reduction import design_model
+from linearize.regions import GROWTH, TOLERANCE, validity
 from linearize.shift_modes import ShiftPoints, gearbox_modes
 from linearize.standard import COMMAND, POSITION, PRESSURES, VELOCITY, standard_modes
-from linearize.validity import GROWTH, TOLERANCE, validity
 from workbench.plants.gearbox import gearbox
 from workbench.plants.servo_drive import servo_drive
 
