@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from math import isfinite
 
+import numpy as np
+
 from linearize.reduction import DesignModel
 from workbench.errors import InputError, Message, listed, nearest
 
@@ -29,9 +31,9 @@ class Interval:
     point: float
     holds: tuple[str, ...] = ()
 
-    def contains(self, value: float) -> bool:
-        """True from the lower end up to, and without, the upper one."""
-        return self.lower <= value < self.upper
+    def contains(self, value: float | np.ndarray) -> bool | np.ndarray:
+        """True from the lower end up to, and without, the upper one; one value or many."""
+        return (self.lower <= value) & (value < self.upper)
 
 
 @dataclass(frozen=True)
@@ -49,8 +51,8 @@ class Level:
         """No state: a switch holds nothing."""
         return ()
 
-    def contains(self, value: float) -> bool:
-        """True at the value."""
+    def contains(self, value: float | np.ndarray) -> bool | np.ndarray:
+        """True at the value; one value or many."""
         return abs(value - self.point) <= SAME_LEVEL
 
 
@@ -61,8 +63,8 @@ class Guard:
     weights: Mapping[str, float]
     offset: float
 
-    def holds(self, signals: Mapping[str, float]) -> bool:
-        """True inside of it."""
+    def holds(self, signals: Mapping[str, float | np.ndarray]) -> bool | np.ndarray:
+        """True inside of it; one value of each signal or many."""
         return self.offset + sum(w * signals[name] for name, w in self.weights.items()) >= 0.0
 
 

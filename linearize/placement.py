@@ -28,7 +28,6 @@ import numpy as np
 
 from linearize.cuts import Guard, Interval, Level, Region
 from linearize.equilibrium import OperatingPoint
-from linearize.hybrid_simulation import ends
 from linearize.modes import Box, HybridModel, Mode, linearised
 from linearize.reduction import DesignModel
 from linearize.visits import Visited
@@ -88,13 +87,11 @@ class _Samples:
     def inside(self, box: Box, guards: tuple[Guard, ...]) -> np.ndarray:
         """Which samples lie in a box where its guards hold, shape (n,)."""
         found = np.ones(len(self.z), dtype=bool)
+        signals = dict(zip(self.names, self.z.T, strict=True))
         for name, region in box.items():
-            lower, upper = ends(region)
-            values = self.z[:, self.names.index(name)]
-            found &= (lower <= values) & (values < upper)
+            found &= region.contains(signals[name])
         for guard in guards:
-            columns = [self.names.index(name) for name in guard.weights]
-            found &= guard.offset + self.z[:, columns] @ [*guard.weights.values()] >= 0.0
+            found &= guard.holds(signals)
         return found
 
     def region(self, box: Box, guards: tuple[Guard, ...], samples: np.ndarray) -> _Region:
