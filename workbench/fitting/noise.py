@@ -10,6 +10,7 @@ from workbench.recording import Recording
 
 BLOCK = 40  # samples
 QUIET_SHARE = 0.3  # this share of the blocks is taken for still
+ALIKE = 1.7  # times their level: three deviations of one block above what all have
 THIRD_DIFFERENCE_GAIN = 20.0  # variance of y3 - 3 y2 + 3 y1 - y0 over that of y
 
 
@@ -20,9 +21,10 @@ class NoNoiseError(ValueError):
 def measured_noise(recordings: Iterable[Recording], channels: Iterable[str]) -> dict[str, float]:
     """Standard deviation of the noise of each channel.
 
-    Each recording is cut into blocks, and the quietest third gives the noise.  A value given with
-    the recording (``Recording.noise``) comes first.  The floor is the quantisation, one step over
-    sqrt(12).
+    Each recording is cut into blocks.  The quietest third gives a level, and all blocks that are
+    alike within the chance of one block give the noise: the quietest alone would make it a tenth
+    too small.  A value given with the recording (``Recording.noise``) comes first.  The floor is
+    the quantisation, one step over sqrt(12).
 
     Raises
     ------
@@ -38,7 +40,7 @@ def _noise_of(recordings: tuple[Recording, ...], channel: str) -> float:
     if given:
         return float(max(given))
     spread = np.concatenate([_block_deviations(r[channel]) for r in recordings])
-    quiet = float(np.quantile(spread, QUIET_SHARE)) if len(spread) else 0.0
+    quiet = _level(spread) if len(spread) else 0.0
     values = np.concatenate([r[channel] for r in recordings])
     noise = max(quiet, _step(values) / np.sqrt(12.0))
     if noise > 0:
@@ -56,6 +58,12 @@ def _block_deviations(values: np.ndarray) -> np.ndarray:
         return np.array([])
     differences = np.diff(values, 3)[: count * BLOCK].reshape(count, BLOCK)
     return np.sqrt(np.mean(differences**2, axis=1) / THIRD_DIFFERENCE_GAIN)
+
+
+def _level(spread: np.ndarray) -> float:
+    """Root mean square of the blocks that are as quiet as the quietest third."""
+    alike = spread[spread <= ALIKE * np.quantile(spread, QUIET_SHARE)]
+    return float(np.sqrt(np.mean(alike**2)))
 
 
 def _step(values: np.ndarray) -> float:
