@@ -14,6 +14,7 @@ from studies.hidden_effects import recordings
 from studies.truth.cases import read_cases
 from workbench.diagnosis.law import empirical_law
 from workbench.diagnosis.scan import scan_catalogue
+from workbench.diagnosis.where import locate
 from workbench.fitting.problem import pose
 
 CASES = read_cases()
@@ -29,14 +30,15 @@ DRAG = "law[v|v|]@slide.quadratic_n_s2_m2"
 @cache
 def made():
     """Recordings of all cases in one batch, which takes no longer than one case."""
-    hidden = (*TERMS, None)
+    hidden = (*TERMS, "magnetic_catch", None)
     return dict(zip(hidden, recordings([CASES[name, 1] for name in hidden]), strict=True))
 
 
 def law_in(hidden):
     train, held_out = made()[hidden]
     problem = pose(SERVO_DRIVE.user_rig(CASES[hidden, 1]), [train], [held_out])
-    return empirical_law(problem, scan_catalogue(problem))
+    where = locate(problem, [train])
+    return empirical_law(problem, scan_catalogue(problem), where=where)
 
 
 @pytest.mark.slow
@@ -49,6 +51,16 @@ def test_a_law_outside_the_catalogue_is_its_own_term_in_its_own_balance(hidden):
     assert law.drop_validation > 0.2
     if hidden == "quadratic_drag":
         assert law.terms[DRAG] == pytest.approx(CASES[hidden, 1].size, rel=0.25)
+
+
+@pytest.mark.slow
+def test_a_magnet_at_one_place_is_three_waves_of_the_place():
+    """No single term is like it: the terms are read off the smoothed missing force."""
+    law = law_in("magnetic_catch")
+
+    assert law.balance == "slide.momentum"
+    assert [step.candidate.cause.drivers[0][-4:] for step in law.steps] == 3 * ["x/L)"]
+    assert law.drop_train > 0.6 and law.drop_validation > 0.6
 
 
 @pytest.mark.slow

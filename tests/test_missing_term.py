@@ -16,7 +16,7 @@ from workbench.diagnosis.dependence import (
     parameter_columns,
     side,
 )
-from workbench.diagnosis.missing_term import Intensities
+from workbench.diagnosis.missing_term import Course, Intensities
 from workbench.diagnosis.suspects import with_missing_flows
 from workbench.fitting.unknowns import nominal_unknowns
 from workbench.plants import PLANTS
@@ -116,7 +116,8 @@ def test_columns_are_what_one_prior_deviation_does_to_the_balance():
     u, d = (np.tile(values[:, None], n) + 0.3 for values in (u, d))
     flow = next(f for f in flows if f.place == "chamber_a.mass")
     state = "chamber_a.pressure_pa"
-    found = parameter_columns(plant, unknowns, state, f"{flow.name}.flow", (x, u, d))
+    course = Course(state, f"{flow.name}.flow", x, u, d)
+    found = parameter_columns(plant, unknowns, course)
 
     def rate(name, step):
         moved = p.copy()

@@ -16,6 +16,7 @@ from workbench.diagnosis.refit import refit
 from workbench.diagnosis.result import Diagnosis, Evidence, Law
 from workbench.diagnosis.rough import rough_fit
 from workbench.diagnosis.scan import scan, scan_catalogue
+from workbench.diagnosis.where import locate
 from workbench.fitting.errors import Errors, errors_of
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.posterior import (
@@ -128,7 +129,7 @@ def add_law(
     progress("prior fit")
     problem = pose(rig, train, validation)
     progress("empirical law")
-    law = empirical_law(problem, scan_catalogue(problem))
+    law = empirical_law(problem, scan_catalogue(problem), where=locate(problem, train))
     if law is None:
         raise ValueError(f"{rig.name}: {NO_LAW}")
     evidence = weighed(evidence, problem.base_validation)

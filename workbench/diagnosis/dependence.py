@@ -16,12 +16,12 @@ Source: diagnosis.md 1.3.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import casadi as ca
 import numpy as np
 
-from workbench.diagnosis.missing_term import Dependence, Loop
+from workbench.diagnosis.missing_term import Course, Dependence, Loop
 from workbench.fitting.unknowns import Unknowns
 from workbench.identification.least_squares import correlation_samples
 from workbench.plant import Plant
@@ -31,30 +31,28 @@ FEWEST = 5  # samples of each direction in a bin that counts
 REVERSAL = 0.1  # standard deviations that a signal comes back from its turning point
 
 
-def parameter_columns(
-    plant: Plant,
-    unknowns: Unknowns,
-    state: str,
-    flow: str,
-    at: tuple[np.ndarray, np.ndarray, np.ndarray],
-) -> np.ndarray:
-    """What one prior deviation of each nominal parameter does to a balance, shape (n, n_p).
+def parameter_columns(plant: Plant, unknowns: Unknowns, course: Course) -> np.ndarray:
+    """What one prior deviation of each nominal parameter does to a balance, shape (n, n_p)."""
+    known = [(k, n) for k, n in enumerate(unknowns.names) if n in plant.model.parameters]
+    scale = unknowns.scale[[k for k, _ in known]]
+    return scale * balance_columns(plant, [name for _, name in known], course)
 
-    ``state`` is that in which the balance shows and ``flow`` the parameter that is a missing one,
-    in whose unit the columns stand.  ``at`` are states, commands and measured inputs, n columns.
+
+def balance_columns(plant: Plant, names: Sequence[str], course: Course) -> np.ndarray:
+    """What one unit of each parameter does to a balance along a course, shape (n, len(names)).
+
+    In the unit of the missing flow of the balance; 0 where that changes nothing.
     """
     model, p = plant.model, plant.nominal[2]
-    known = [(k, n) for k, n in enumerate(unknowns.names) if n in model.parameters]
-    rows = [model.parameters.index(name) for _, name in known]
-    rate = model.rates[model.states.index(state)]
-    wanted = model.symbols[3][[*rows, model.parameters.index(flow)]]
-    slope = ca.Function("slope", [*model.symbols], [ca.densify(ca.jacobian(rate, wanted))])
-    n = at[0].shape[1]
-    values = slope.map(n)(*at, np.tile(p[:, None], n)).full().reshape(n, len(rows) + 1)
-    scale = unknowns.scale[[k for k, _ in known]]
+    rows = [model.parameters.index(name) for name in (*names, course.flow)]
+    rate = model.rates[model.states.index(course.state)]
+    slope = ca.jacobian(rate, model.symbols[3][rows])
+    slopes = ca.Function("slope", [*model.symbols], [ca.densify(slope)])
+    n = course.states.shape[1]
+    at = (course.states, course.commands, course.measured, np.tile(p[:, None], n))
+    values = slopes.map(n)(*at).full().reshape(n, len(rows))
     answer = values[:, -1:]
-    found = np.divide(values[:, :-1] * scale, answer, out=np.zeros((n, len(rows))),
-                      where=answer != 0.0)  # fmt: skip
+    found = np.divide(values[:, :-1], answer, out=np.zeros((n, len(names))), where=answer != 0.0)
     return np.where(np.isfinite(found), found, 0.0)
 
 

@@ -101,7 +101,7 @@ def diagnose(
     profiles, refits, moved = found.profiles, found.refits, found.moved
     ranking = ranked(problem, profiles, refits, moved, found.begun)
     ranking = with_pairs(problem, ranking, profiles, progress)
-    law = _law(problem, ranking, profiles, progress)
+    law = _law(problem, ranking, profiles, where, progress)
     far = far_above_noise(problem.base_validation)
     verdict = judged(ranking, law, evidence.strong, far)
     best = ranking[0] if verdict in NAMING else None
@@ -183,7 +183,11 @@ def _best_share(refits: list[Refit]) -> float:
 
 
 def _law(
-    problem: Problem, ranking: tuple[Ranked, ...], profiles: list[Profile], progress: Progress
+    problem: Problem,
+    ranking: tuple[Ranked, ...],
+    profiles: list[Profile],
+    where: Where | None,
+    progress: Progress,
 ) -> Law | None:
     """An empirical law, unless an effect of the catalogue explains most of the misfit already.
 
@@ -197,7 +201,7 @@ def _law(
         return None
     progress("empirical law")
     led_by = (p.drop for p in profiles if certain and p.candidate == leader.candidate)
-    law = empirical_law(problem, profiles, max(led_by, default=0.0))
+    law = empirical_law(problem, profiles, max(led_by, default=0.0), None if certain else where)
     followed = [r for r in ranking if r.accepted or r.reasons == (SHARE_REASON,)]
     effect, shift = (
         max((r.drop_train for r in followed if r.kind is kind), default=0.0)

@@ -3,7 +3,8 @@
 Of the terms of :mod:`workbench.effects.empirical` a law takes at most three, one after the other,
 as long as each takes another tenth of the misfit.  The next one is chosen by
 :mod:`workbench.diagnosis.law_choice` and goes through the same projected scan and the same refit by
-shooting as every effect.  The result is judged like an effect and labelled empirical.
+shooting as every effect; where no single term stands out, :mod:`workbench.diagnosis.law_seed` reads
+several off the smoothed missing term.  The result is judged like an effect and labelled empirical.
 
 Source: diagnosis.md 1.9.
 """
@@ -14,10 +15,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from workbench.candidate import Candidate
-from workbench.diagnosis.judge import reasons_against
+from workbench.diagnosis.judge import CERTAIN_SHARE, reasons_against
 from workbench.diagnosis.law_choice import worth_scanning
+from workbench.diagnosis.law_seed import refitted, seeds
 from workbench.diagnosis.refit import Refit, held_out_drop, refit
-from workbench.diagnosis.result import Law, LawTerm
+from workbench.diagnosis.result import Law, LawTerm, Where
 from workbench.diagnosis.rough import rough_fit
 from workbench.diagnosis.scan import Profile, scan
 from workbench.fitting.problem import Problem, misfit
@@ -32,18 +34,54 @@ LEAST_TERM_SHARE = 0.10  # of the misfit that another term must take
 LEAST_PROMISE = 0.03  # of the misfit, of the secant of a term on top of others
 
 
-def empirical_law(problem: Problem, known: Sequence[Profile], to_beat: float = 0.0) -> Law | None:
+def empirical_law(
+    problem: Problem,
+    known: Sequence[Profile],
+    to_beat: float = 0.0,
+    where: Where | None = None,
+) -> Law | None:
     """The law of up to three terms that passes every criterion; None where none does.
 
-    ``known`` are the profiles of the catalogue at the base: what they do is no law.  None, too,
+    ``known`` are the profiles of the catalogue at the base: what they do is no law.  Nor is it one
     where the scan of its first term promises less than ``to_beat``, which the scan of an effect
-    promised.
+    promised.  Where terms found one after the other do not explain half of the misfit, the missing
+    term of ``where`` is asked for several at once (:mod:`workbench.diagnosis.law_seed`).
     """
     problem = with_terms(problem)
+    terms = [c for c in problem.whole.candidates.values() if is_law(c.name)]
+    law = _term_by_term(problem, terms, known, to_beat)
+    if law and law.drop_train >= CERTAIN_SHARE:
+        return law
+    laws = [each for each in (law, _at_once(problem, terms, where)) if each]
+    return max(laws, key=lambda each: each.drop_train, default=None)
+
+
+def _at_once(problem: Problem, terms: Sequence[Candidate], where: Where | None) -> Law | None:
+    """The law that the smoothed missing term suggests, as long as each term takes its tenth."""
+    best: Law | None = None
+    before = problem.base, problem.base_validation
+    steps: list[LawTerm] = []
+    read_off = seeds(problem.whole, problem.base.unknowns, where, terms, MOST_TERMS)
+    for count, seed in enumerate(read_off, start=1):
+        found = refitted(problem, seed)
+        fit, held_out = (steps[-1].fit, steps[-1].validation) if steps else before
+        drops = (fit.cost - found.fit.cost) / misfit(fit), held_out_drop(held_out, found.validation)
+        steps.append(LawTerm(found.candidate, found.fit, found.validation, *drops))
+        gained = found.drop_train - (best.drop_train if best else 0.0)
+        more = count - (len(best.steps) if best else 0)
+        sound = not reasons_against(problem.base, found, parameters=count)
+        if sound and gained >= more * LEAST_TERM_SHARE:
+            best = _law(found, [*steps])
+    return best
+
+
+def _term_by_term(
+    problem: Problem, terms: list[Candidate], known: Sequence[Profile], to_beat: float
+) -> Law | None:
+    """The law that grows by the term that the windows choose."""
     first = problem
     steps: list[LawTerm] = []
     best: Refit | None = None
-    terms = [c for c in problem.whole.candidates.values() if is_law(c.name)]
     for _ in range(MOST_TERMS):
         # What has a name at the base has none to offer on top of a term that imitates it either.
         terms = [term for term in terms if term not in problem.added]

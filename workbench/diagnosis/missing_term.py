@@ -56,3 +56,20 @@ class Intensities:
     likeliest: float
     neighbour: float
     term: np.ndarray = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Course:
+    """What the smoother ran through while it sought a missing flow.
+
+    state       in whose rate the flow shows
+    flow        the parameter of the plant with missing flows that is this one
+    states, commands, measured
+                smoothed states and the inputs at each sample, n columns each, in SI
+    """
+
+    state: str
+    flow: str
+    states: np.ndarray = field(repr=False)
+    commands: np.ndarray = field(repr=False)
+    measured: np.ndarray = field(repr=False)

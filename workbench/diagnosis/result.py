@@ -9,7 +9,7 @@ from enum import Enum
 import numpy as np
 
 from workbench.candidate import Candidate
-from workbench.diagnosis.missing_term import Dependence, Intensities, Loop
+from workbench.diagnosis.missing_term import Course, Dependence, Intensities, Loop
 from workbench.effect import Kind
 from workbench.fitting.errors import SignalError
 from workbench.fitting.gauss_newton import Fit
@@ -142,6 +142,8 @@ class Where:
     imitated
         Share of the term's variance that the nominal parameters explain within their priors; it
         is left out in ``against``.
+    course
+        What the smoother ran through.
     """
 
     balance: str
@@ -154,6 +156,7 @@ class Where:
     by_regime: Mapping[str, float]
     intensities: Intensities | None = None
     imitated: float = 0.0
+    course: Course | None = field(default=None, repr=False)
 
     @property
     def memory(self) -> tuple[Dependence, Loop] | None:

@@ -27,7 +27,8 @@ from workbench.diagnosis.dependence import (
     parameter_columns,
     side,
 )
-from workbench.diagnosis.result import Intensities, Where
+from workbench.diagnosis.missing_term import Course, Intensities
+from workbench.diagnosis.result import Where
 from workbench.diagnosis.suspects import Suspect, suspects, wandering, with_missing_flows
 from workbench.effect import Balance
 from workbench.filter_passes import FilterResult, log_likelihoods, recording_filter, smooth
@@ -69,10 +70,10 @@ def locate(problem: Problem, recordings: Sequence[Recording]) -> Where | None:
     neighbour = _neighbour(worst, likeliest)
     filters = lacking({worst.parameter: likeliest})
     result, other = (smooth(filters, recording, q / likeliest) for q in (likeliest, neighbour))
-    term, at = result.unknown[0], _along(plant, recording, result, decimate)
-    columns = parameter_columns(plant, problem.base.unknowns, worst.state, worst.parameter, at)
+    term, course = result.unknown[0], _course(plant, recording, result, decimate, worst)
+    columns = parameter_columns(plant, problem.base.unknowns, course)
     rest, rest_other = (d - imitated(d, columns) for d in (term, other.unknown[0]))
-    drivers = _drivers(plant, result, at[1])
+    drivers = _drivers(plant, result, course.commands)
     return Where(
         balance=worst.balance,
         by_balance={s.balance: gain for s, (gain, _) in gains.items()},
@@ -84,6 +85,7 @@ def locate(problem: Problem, recordings: Sequence[Recording]) -> Where | None:
         by_regime=regime_shares(problem.base),
         intensities=Intensities(likeliest, neighbour, other.unknown[0]),
         imitated=max(1.0 - float(rest.var() / term.var()), 0.0) if term.any() else 0.0,
+        course=course,
     )
 
 
@@ -142,13 +144,13 @@ def _gains(
     return gains
 
 
-def _along(
-    plant: Plant, recording: Recording, result: FilterResult, decimate: int
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _course(
+    plant: Plant, recording: Recording, result: FilterResult, decimate: int, suspect: Suspect
+) -> Course:
     """Smoothed states, commands and measured inputs at each sample of the filter."""
     used = [(inputs(plant, piece), len(piece) // decimate * decimate) for piece in recording.pieces]
     u, d = (np.hstack([both[k][:, : max(n, 1) : decimate] for both, n in used]) for k in (0, 1))
-    return result.states, u, d
+    return Course(suspect.state, suspect.parameter, result.states, u, d)
 
 
 def _drivers(plant: Plant, result: FilterResult, commands: np.ndarray) -> dict[str, np.ndarray]:
