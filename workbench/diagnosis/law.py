@@ -3,8 +3,8 @@
 Of the terms of :mod:`workbench.effects.empirical` a law takes at most three, one after the other,
 as long as each takes another tenth of the misfit.  The next one is chosen by
 :mod:`workbench.diagnosis.law_choice` and goes through the same projected scan and the same refit by
-shooting as every effect; where no single term stands out, :mod:`workbench.diagnosis.law_seed` reads
-several off the smoothed missing term.  The result is judged like an effect and labelled empirical.
+shooting as every effect; :mod:`workbench.diagnosis.law_seed` reads several at once off the smoothed
+missing term.  The result is judged like an effect and labelled empirical.
 
 Source: diagnosis.md 1.9.
 """
@@ -13,9 +13,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from math import isnan
 
 from workbench.candidate import Candidate
-from workbench.diagnosis.judge import CERTAIN_SHARE, reasons_against
+from workbench.diagnosis.judge import CLEARLY_LESS, reasons_against
 from workbench.diagnosis.law_choice import worth_scanning
 from workbench.diagnosis.law_seed import refitted, seeds
 from workbench.diagnosis.refit import Refit, held_out_drop, refit
@@ -44,16 +45,22 @@ def empirical_law(
 
     ``known`` are the profiles of the catalogue at the base: what they do is no law.  Nor is it one
     where the scan of its first term promises less than ``to_beat``, which the scan of an effect
-    promised.  Where terms found one after the other do not explain half of the misfit, the missing
-    term of ``where`` is asked for several at once (:mod:`workbench.diagnosis.law_seed`).
+    promised.  The missing term of ``where`` is asked for several terms at once
+    (:mod:`workbench.diagnosis.law_seed`); they are taken where they leave clearly less.
     """
     problem = with_terms(problem)
     terms = [c for c in problem.whole.candidates.values() if is_law(c.name)]
     law = _term_by_term(problem, terms, known, to_beat)
-    if law and law.drop_train >= CERTAIN_SHARE:
-        return law
-    laws = [each for each in (law, _at_once(problem, terms, where)) if each]
-    return max(laws, key=lambda each: each.drop_train, default=None)
+    other = _at_once(problem, terms, where)
+    if law is None or other is None:
+        return law or other
+    return other if _left(other) < (1.0 - CLEARLY_LESS) * _left(law) else law
+
+
+def _left(law: Law) -> float:
+    """Share of the misfit that a law leaves, as the mean over training and held-out recordings."""
+    held_out = law.drop_train if isnan(law.drop_validation) else law.drop_validation
+    return 1.0 - (law.drop_train + held_out) / 2.0
 
 
 def _at_once(problem: Problem, terms: Sequence[Candidate], where: Where | None) -> Law | None:

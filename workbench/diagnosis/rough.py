@@ -1,8 +1,8 @@
 """First fits of the candidates that a scan puts in front: a few steps each.
 
 The scan is linear in the nuisances, and where they have moved far to imitate an effect its order is
-not to be trusted.  A short fit that begins with the derivatives of the base is cheap, and tells the
-few that are worth a long one.  A fit from one poor start can end far from the minimum, and the scan
+not to be trusted.  A short fit with the derivatives of the base is cheap, and tells the few that
+are worth a long one.  A fit from one poor start can end far from the minimum, and the scan
 hands over good ones: its best sizes with the linear step of the nuisances, with more of it, and
 with none, each tried and the best followed.
 
@@ -19,7 +19,7 @@ import numpy as np
 from workbench.candidate import Candidate
 from workbench.diagnosis.blind_starts import blind_starts, settled
 from workbench.diagnosis.scan import Profile, Trial
-from workbench.fitting.gauss_newton import Fit, fit_windows, points_costs
+from workbench.fitting.gauss_newton import Fit, fit_windows, follow, points_costs
 from workbench.fitting.linearised import Point, borrowed
 from workbench.fitting.problem import Problem, staged
 from workbench.fitting.start_states import carried
@@ -58,9 +58,11 @@ def rough_fit(problem: Problem, profile: Profile, most: int = STARTS) -> Rough:
     tried = []
     known = (base.windows, base.unknowns)
     for start in (each for each in begun if each.cost <= most):
+        if blind:
+            tried.append(fit_windows(windows, unknowns, start, ITERATIONS))
+            continue
         lent = (base.derivatives, known, windows, unknowns, start.point, start.residual)
-        at = None if blind else borrowed(*lent)
-        tried.append(fit_windows(windows, unknowns, start, ITERATIONS, at))
+        tried.append(follow(windows, unknowns, start, borrowed(*lent), ITERATIONS))
     fit = min(tried, key=lambda each: each.cost)
     if base.cost - fit.cost < KEPT * profile.drop:
         further = _from_larger(problem, windows, unknowns, profile)

@@ -118,6 +118,26 @@ def fit_windows(
     return Fit(windows, unknowns, now.point, now.chi2, now.cost, converged, at)
 
 
+def follow(
+    windows: Windows, unknowns: Unknowns, start: Cost, at: Linearised, iterations: int
+) -> Fit:
+    """Steps with derivatives ``at`` taken near by, as long as they bring more than 2 %.
+
+    No derivative is taken anew, which is what makes a fit dear: where it ends may be short of the
+    minimum.
+    """
+    now = start
+    for _ in range(iterations):
+        found = _stepped(windows, unknowns, at, now)
+        fall = (now.cost - found.cost) / max(now.cost, 1e-12)
+        now = min(now, found, key=lambda each: each.cost)
+        if fall < AGAIN:
+            break
+        at = secant(windows, at, now.point, now.residual)
+    at = seen_at(windows, at, now.point, now.residual)
+    return Fit(windows, unknowns, now.point, now.chi2, now.cost, False, at)
+
+
 def _stepped(windows: Windows, unknowns: Unknowns, at: Linearised, now: Cost) -> Cost:
     """The full step where it keeps half of what it promises, else the best of several damped ones.
 
