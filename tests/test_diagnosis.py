@@ -158,6 +158,13 @@ def test_what_a_diagnosis_puts_first_can_be_accepted_as_it_was_fitted(rig, found
     assert step.drop_train == found.ranking[0].drop_train
 
 
+def test_what_contradicts_the_rig_cannot_be_accepted(rig, found):
+    withdrawn = replace(found, contradicted=True, sentence="recording and rig contradict")
+
+    with pytest.raises(ValueError, match="recording and rig contradict"):
+        accept(rig, withdrawn)
+
+
 def test_a_size_far_beyond_typical_is_found(rig):
     """300 N are 14 typical constant forces."""
     step = add(rig, "constant_force", [bench(1, nothing, 300.0)], [bench(2, nothing, 300.0, 4e5)])

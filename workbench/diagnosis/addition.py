@@ -152,8 +152,10 @@ def accept(rig: Rig, diagnosis: Diagnosis) -> Addition:
     Raises
     ------
     ValueError
-        If the first of the ranking was not refitted.
+        If the first of the ranking was not refitted, or recording and rig contradict each other.
     """
+    if diagnosis.contradicted:
+        raise ValueError(f"{diagnosis.rig_name}: {diagnosis.sentence}")
     best = diagnosis.ranking[0] if diagnosis.ranking else None
     if best is None or best.fit is None:
         raise ValueError(f"{diagnosis.rig_name}: the diagnosis followed no candidate to a refit")

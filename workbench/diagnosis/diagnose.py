@@ -91,15 +91,15 @@ def diagnose(
         warnings += ("the prior fit did not converge: the ranking is provisional",)
     progress("where it fails")
     where = locate(problem, train)
-    found = _followed(problem, where, progress)
-    better = improved_base(problem, [each.fit for each in found.refits])
+    followed = _followed(problem, where, progress)
+    better = improved_base(problem, [each.fit for each in followed.refits])
     if better:
         progress("the prior fit is improved by what the refits found: once more")
         problem = better
         where = where and replace(where, by_regime=regime_shares(problem.base))
-        found = _followed(problem, where, progress)
-    profiles, refits, moved = found.profiles, found.refits, found.moved
-    ranking = ranked(problem, profiles, refits, moved, found.begun)
+        followed = _followed(problem, where, progress)
+    profiles, refits, moved = followed.profiles, followed.refits, followed.moved
+    ranking = ranked(problem, profiles, refits, moved, followed.begun)
     ranking = with_pairs(problem, ranking, profiles, progress)
     law = _law(problem, ranking, profiles, where, progress)
     far = far_above_noise(problem.base_validation)
@@ -108,8 +108,8 @@ def diagnose(
     if best and best.fit and not best.fit.converged:
         warnings += (f"the refit with {best.candidate.name} did not converge: its size may be off",)
     after = (law.fit, law.validation) if law else (best and best.fit, best and best.validation)
-    warnings += unexplained(far, verdict) + unsteady(ranking, profiles, verdict)
-    return credible(
+    warnings += unexplained(far, verdict)
+    found = credible(
         Diagnosis(
             rig_name=rig.name,
             verdict=verdict,
@@ -127,6 +127,7 @@ def diagnose(
         ),
         doubts,
     )
+    return replace(found, warnings=found.warnings + unsteady(ranking, profiles, found.verdict))
 
 
 @dataclass(frozen=True)
