@@ -41,7 +41,7 @@ AT_BOUND = 1e-9  # relative: a value scaled and back is off by a rounding
 LARGEST_TIE = 3
 SAME_DIRECTION = 0.9  # cosine of two signatures that are one
 CLOSE_DROP = 0.25  # of the leader's drop: within it the order is not to be trusted
-CERTAIN_SHARE = 0.5  # an accepted candidate above it needs no comparison with a law
+CERTAIN_SHARE = 0.75  # an accepted candidate above it needs no comparison with a law
 CLEARLY_LESS = 0.20  # of the held-out misfit that is left
 CLOSE_DROP_SAME = 0.50  # the same for signatures that are one
 
