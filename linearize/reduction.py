@@ -8,14 +8,14 @@ can be printed, and undone one line at a time.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import casadi as ca
 import numpy as np
 
-from linearize.coupling import RigidCoupling, coupled_rates
+from linearize.coupling import RigidCoupling, coupled_rates, with_reactions
 from workbench.effect import Expression
 from workbench.effects.bristle_friction import BristleFriction
 from workbench.effects.sensor_response import SensorLag
@@ -56,6 +56,10 @@ class DesignModel:
         Values that differ from the plant's, by ``part.parameter_unit``.
     couplings
         Parts that move with a body, and bring no states.
+    pushes
+        For each velocity of bodies that feel each other's inertia, a state that pushes on it alone.
+    held
+        Velocities among those that something holds at zero.
     """
 
     plant: Plant
@@ -63,6 +67,20 @@ class DesignModel:
     left_out: tuple[LeftOut, ...]
     nulls: Mapping[str, float] = field(default_factory=dict)
     couplings: tuple[RigidCoupling, ...] = ()
+    pushes: Mapping[str, str] = field(default_factory=dict)
+    held: tuple[str, ...] = ()
+
+    def holding(self, states: Iterable[str]) -> DesignModel:
+        """The same model with the velocities among these states held, where others feel that."""
+        held = tuple(name for name in states if name in self.pushes)
+        if held not in self._held:
+            self._held[held] = replace(self, held=held)
+        return self._held[held]
+
+    @cached_property
+    def _held(self) -> dict[tuple[str, ...], DesignModel]:
+        """Models that were made by :meth:`holding`, with their derivatives; at first this one."""
+        return {self.held: self}
 
     @property
     def commands(self) -> tuple[str, ...]:
@@ -148,8 +166,12 @@ class DesignModel:
     @cached_property
     def _expressions(self) -> tuple[ca.SX, ca.SX]:
         _, rates, outputs = self._substituted
-        rows = [self.plant.model.states.index(name) for name in self.states]
-        return rates[rows], outputs
+        own = rates[[self.plant.model.states.index(name) for name in self.states]]
+        rows = {
+            name: (self.states.index(name), self.states.index(push))
+            for name, push in self.pushes.items()
+        }
+        return with_reactions(self.symbols[0], own, rows, self.held), outputs
 
 
 def design_model(plant: Plant) -> DesignModel:
@@ -163,11 +185,16 @@ def design_model(plant: Plant) -> DesignModel:
     return DesignModel(design, kept, tuple(_left_out(lean)))
 
 
-def closed_command(plant: Plant) -> float:
-    """The first command's value that opens nothing: its nominal one and the valve's offset."""
-    signal = plant.commands[0]
+def closed_command(plant: Plant, name: str | None = None) -> float:
+    """Value of a command, the first unless named, at which its valve stands at its centre.
+
+    That is the centre of the valve itself, the nominal command where it has none, and the offset.
+    """
+    signal = next(s for s in plant.commands if name in (None, s.name))
+    valve = next((e for e in plant.effects if e.name == signal.name.partition(".")[0]), None)
     offsets = (e for e in plant.effects if isinstance(e, ValveOffset) and e.signal == signal.name)
-    return signal.nominal + sum(float(effect.offset_v) for effect in offsets)
+    centre = float(getattr(valve, "centre_v", signal.nominal))
+    return centre + sum(float(effect.offset_v) for effect in offsets)
 
 
 def _passed_over(plant: Plant, state: str) -> bool:

@@ -1,0 +1,48 @@
+"""A mode for each end stop: what rests against it is held there until pressure pulls it off.
+
+The spring of a stop (2e6 N/m) makes poles that no design wants; without its give the position and
+the velocity are held.  The piston leaves where the force away from the stop beats static friction.
+
+Source: physics.md 4.3 ({free, stop lo, stop hi}); set-valued contact as in 4.2, "hold at Neutral".
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from linearize.axis import Axis
+from linearize.cuts import Guard, Interval
+from linearize.holding import PROBES, least_rate, whole_point
+from linearize.modes import HybridModel, Mode
+
+NEAR = 1e-3  # of the range: nearer than this to a stop counts as being there
+
+LOWER, UPPER = "at lower stop", "at upper stop"
+
+
+def stop_cut(axis: Axis) -> tuple[Interval, ...]:
+    """The two ends of the range, each of which holds what it stops."""
+    low, high = axis.ends
+    near, held = NEAR * (high - low), (axis.position, axis.velocity)
+    return (
+        Interval(axis.prefix + LOWER, -np.inf, low + near, low, held),
+        Interval(axis.prefix + UPPER, high - near, np.inf, high, held),
+    )
+
+
+def guarded(hybrid: HybridModel, axis: Axis, mode: Mode) -> Mode:
+    """The mode of a stop with what ends it: motion away, and a force that static friction loses to.
+
+    The force is the rate of the velocity where friction hinders it most, affine in the pressures.
+    """
+    model = hybrid.model
+    away = 1 if mode.box[axis.position].label == axis.prefix + LOWER else -1
+    probes = away * np.linspace(axis.resting, axis.sliding, PROBES)
+    column = model.states.index(axis.velocity)
+    row = away * least_rate(model, whole_point(hybrid, mode), column, probes, away)
+    names = (*model.states, *model.commands)
+    pulled = {name: -float(w) for name, w in zip(names, row, strict=False) if w}
+    guards = (Guard({axis.velocity: -away}, axis.resting), Guard(pulled, -float(row[-1])))
+    return replace(mode, guards=guards)
