@@ -12,6 +12,7 @@ from linearize.cuts import Interval, Region
 from linearize.equilibrium import OperatingPoint, operating_point
 from linearize.reduction import DesignModel
 
+BESIDE = 0.25  # of the half-width of the middle interval of a command
 Box = Mapping[str, Region]
 
 
@@ -49,10 +50,14 @@ class Axis:
     prefix: str = ""
 
     def valve_cut(self) -> tuple[Interval, ...]:
-        """The command below, at and above the valve's centre."""
+        """The command below, at and above the valve's centre.
+
+        A valve that does not shut has a corner at its very centre: the point lies beside it.
+        """
         low, high = self.centre - self.middle, self.centre + self.middle
         edges = (-inf, low, high, inf)
-        points = (self.centre - self.opening, self.centre, self.centre + self.opening)
+        middle = self.centre + (0.0 if self.shut else BESIDE * self.middle)
+        points = (self.centre - self.opening, middle, self.centre + self.opening)
         return self._cut(self.valves, edges, points)
 
     def friction_cut(self) -> tuple[Interval, ...]:
