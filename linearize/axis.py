@@ -12,7 +12,7 @@ from linearize.cuts import Interval, Region
 from linearize.equilibrium import OperatingPoint, operating_point
 from linearize.reduction import DesignModel
 
-BESIDE = 0.25  # of the half-width of the middle interval of a command
+BESIDE = 0.1  # of the half-width of the middle interval of a command
 Box = Mapping[str, Region]
 
 

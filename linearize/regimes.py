@@ -33,11 +33,10 @@ def flow_regimes(
     there = choked(grid)
     changes = np.flatnonzero(there[1:] != there[:-1])
     edges = [low_pa, *(_edge(choked, *grid[k : k + 2]) for k in changes), high_pa]
-    regimes = there[[*changes, -1]]
-    label = chamber.replace("_", " ")
+    names = _named(there[[*changes, -1]])
     parts = [
-        Interval(f"{label} {'choked' if regime else 'subsonic'}", low, high, 0.5 * (low + high))
-        for regime, low, high in zip(regimes, edges, edges[1:], strict=False)
+        Interval(f"{chamber.replace('_', ' ')} {name}", low, high, 0.5 * (low + high))
+        for name, low, high in zip(names, edges, edges[1:], strict=False)
     ]
     if len(parts) < 2:
         return ()
@@ -45,6 +44,16 @@ def flow_regimes(
     parts[0] = Interval(first.label, -inf, first.upper, first.point)
     parts[-1] = Interval(last.label, last.lower, inf, last.point)
     return tuple(parts)
+
+
+def _named(choked: np.ndarray) -> list[str]:
+    """Names of regimes by rising pressure; gas flows in at the lowest one, out at the highest."""
+    ends = ("choked in", "choked out") if choked.sum() > 1 else ("choked", "choked")
+    names = ["choked" if each else "subsonic" for each in choked]
+    for place, name in zip((0, -1), ends, strict=True):
+        if choked[place]:
+            names[place] = name
+    return names
 
 
 def _choking(model: DesignModel, pressure: str, commands: Mapping[str, float], chamber: str):
