@@ -1,8 +1,8 @@
-"""One cylinder behind a proportional valve: how its range is cut, and where its modes lie."""
+"""What moves, and the cylinder that drives it: how its range is cut, and where its modes lie."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 
@@ -17,37 +17,54 @@ Box = Mapping[str, Region]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Axis:
-    """What a cylinder moves, by the names of its signals, and the sizes that cut its range.
+class Travel:
+    """What moves between two stops against dry friction, by the names of its signals.
 
-    position, velocity    states of what moves: a slide, a rod, a joint
+    position, velocity    states of what moves: a slide, a rod, a joint, a piston
+    resting, sliding      speed below which it sticks, and speed at the points of sliding modes
+    ends                  of its range, where the stops are
+    prefix                tells the labels of several apart
+    """
+
+    position: str
+    velocity: str
+    resting: float
+    sliding: float
+    ends: tuple[float, float]
+    prefix: str = ""
+
+    def friction_cut(self) -> tuple[Interval, ...]:
+        """Sliding down, sticking, which holds position and velocity, and sliding up."""
+        rest, held = self.resting, (self.position, self.velocity)
+        return (
+            Interval(self.prefix + "slide -", -inf, -rest, -self.sliding),
+            Interval(self.prefix + "stick", -rest, rest, 0.0, held),
+            Interval(self.prefix + "slide +", rest, inf, self.sliding),
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Axis(Travel):
+    """A travel driven by a cylinder behind a proportional valve.
+
     pressures             of the chamber that drives it up, then of the one that drives it down
     command               of its valve, behind the dead zone
     centre                command at which the valve stands at its centre
     middle, opening       half-width of the middle interval of the command; from the centre to the
                           points of the outer ones
-    resting, sliding      speed below which it sticks, and speed at the points of sliding modes
-    ends                  of its range, where the stops are
     valves                labels of the command below, at and above the centre
     places                labels of equal parts of the range
     shut                  True where the valve shuts at its centre, but for a leak
-    prefix                tells the labels of several axes apart
     """
 
-    position: str
-    velocity: str
     pressures: tuple[str, str]
     command: str
     centre: float
     middle: float
     opening: float
-    resting: float
-    sliding: float
-    ends: tuple[float, float]
     valves: tuple[str, str, str]
     places: tuple[str, ...]
     shut: bool = False
-    prefix: str = ""
 
     def valve_cut(self) -> tuple[Interval, ...]:
         """The command below, at and above the valve's centre.
@@ -60,21 +77,14 @@ class Axis:
         points = (self.centre - self.opening, middle, self.centre + self.opening)
         return self._cut(self.valves, edges, points)
 
-    def friction_cut(self) -> tuple[Interval, ...]:
-        """Sliding down, sticking, which holds position and velocity, and sliding up."""
-        down, up = (Interval(self.prefix + f"slide {sign}", *ends) for sign, ends in (
-            ("-", (-inf, -self.resting, -self.sliding)), ("+", (self.resting, inf, self.sliding)),
-        ))  # fmt: skip
-        held = (self.position, self.velocity)
-        stick = Interval(self.prefix + "stick", -self.resting, self.resting, 0.0, held)
-        return down, stick, up
-
     def place_cut(self) -> tuple[Interval, ...]:
         """Equal parts of the range, with their points in the middle."""
         steps = [float(place) for place in np.linspace(*self.ends, 2 * len(self.places) + 1)]
         return self._cut(self.places, (-inf, *steps[2:-1:2], inf), steps[1::2])
 
-    def _cut(self, labels, edges, points) -> tuple[Interval, ...]:
+    def _cut(
+        self, labels: Sequence[str], edges: Sequence[float], points: Sequence[float]
+    ) -> tuple[Interval, ...]:
         parts = zip(labels, edges, edges[1:], points, strict=False)
         return tuple(Interval(self.prefix + label, *rest) for label, *rest in parts)
 

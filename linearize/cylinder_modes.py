@@ -10,16 +10,9 @@ from linearize.cuts import Region
 from linearize.modes import HybridModel, Mode, hybrid_modes
 from linearize.reduction import DesignModel, LeftOut
 from linearize.regimes import flow_regimes
-from linearize.stopped import guarded, stop_cut
+from linearize.stopped import AT_STOPS, guarded, stop_cut
 from workbench.plant import Plant
 
-AT_STOPS = (
-    LeftOut("sliding into a stop", "the mode at the stop", "the impact is over within 1 ms"),
-    LeftOut("sliding off a stop", "the free slide", "a stop only pushes"),
-    LeftOut(
-        "sticking at a stop", "the mode at the stop", "static friction counts in what ends that one"
-    ),
-)
 BACKFLOW = LeftOut(
     "choked flow back into the supply", "no mode", "no chamber comes to twice the supply pressure"
 )

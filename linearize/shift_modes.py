@@ -16,18 +16,22 @@ from math import inf
 import casadi as ca
 import numpy as np
 
+from linearize.axis import Travel
 from linearize.cuts import Guard, Interval, Level, Region
 from linearize.equilibrium import operating_point
-from linearize.modes import HybridModel, Mode, hybrid_modes, linearised, placed_at
+from linearize.modes import HybridModel, Mode, at_points, hybrid_modes, linearised, placed_at
 from linearize.reduction import DesignModel
 from linearize.shifting import (
     FLOWS,
+    HEAT,
     POSITION,
     PRESSURES,
     VELOCITY,
+    Omission,
     shift_model,
     switched_shift_model,
 )
+from linearize.stopped import AT_STOPS, guarded, stop_cut
 from workbench.effects.forces import EndStops
 from workbench.effects.solenoid_valve import SolenoidValve
 from workbench.plant import Plant
@@ -109,13 +113,35 @@ def switched_modes(
     return hybrid_modes(plant, cuts, _placing(COMMANDS, points), model)
 
 
+def sliding_modes(plant: Plant, omitted: tuple[Omission, ...] = (HEAT,)) -> HybridModel:
+    """Sides x {slide -, stick, slide +}, held at Neutral and at both ends, under mass flows.
+
+    Dry friction and detent stay: over 50 ms of driving the piston stands as long as it moves, and
+    it stands by them.  What :func:`linearize.placement.placed_modes` begins with.
+    """
+    model = shift_model(plant, omitted)
+    travel = Travel(
+        position=POSITION,
+        velocity=VELOCITY,
+        resting=NEUTRAL_M_S,
+        sliding=SLIDING_M_S,
+        ends=(-_stroke_m(model), _stroke_m(model)),
+    )
+    cuts = {POSITION: side_cut(model), VELOCITY: travel.friction_cut()}
+    free = hybrid_modes(plant, cuts, at_points, model)
+    ends = (hybrid_modes(plant, {POSITION: (end,)}, at_points, model) for end in stop_cut(travel))
+    stopped = (guarded(each, travel, mode) for each in ends for mode in each.modes)
+    modes = (held_at_neutral(model), *stopped, *free.modes)
+    return HybridModel(plant, model, modes, AT_STOPS)
+
+
 def side_cut(model: DesignModel, pieces: int = 1) -> tuple[Interval, ...]:
     """Low and High side, each in so many pieces over which a volume changes by the same ratio.
 
     Of the two volumes that is the one that the side shrinks to its dead volume: 1 on the Low side,
     2 on the High one.  Each point is where that volume is the geometric mean of its piece.
     """
-    stroke_m = next(float(e.upper_m) for e in model.plant.effects if _ends(e))
+    stroke_m = _stroke_m(model)
     volume = model.quantities("chamber_1.volume_m3", "chamber_2.volume_m3")
     cut = []
     for row, (label, ends_m) in enumerate(
@@ -188,5 +214,7 @@ def _rising(values: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndar
     return (values - values[0]) / (values[-1] - values[0]), places
 
 
-def _ends(effect: object) -> bool:
-    return isinstance(effect, EndStops) and effect.body == MAIN
+def _stroke_m(model: DesignModel) -> float:
+    """From Neutral to either end."""
+    stops = (e for e in model.plant.effects if isinstance(e, EndStops) and e.body == MAIN)
+    return float(next(stops).upper_m)

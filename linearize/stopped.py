@@ -12,37 +12,45 @@ from dataclasses import replace
 
 import numpy as np
 
-from linearize.axis import Axis
+from linearize.axis import Travel
 from linearize.cuts import Guard, Interval
 from linearize.holding import PROBES, least_rate, whole_point
 from linearize.modes import HybridModel, Mode
+from linearize.reduction import LeftOut
 
 NEAR = 1e-3  # of the range: nearer than this to a stop counts as being there
 
+AT_STOPS = (
+    LeftOut("sliding into a stop", "the mode at the stop", "the impact is over within 1 ms"),
+    LeftOut("sliding off a stop", "the free slide", "a stop only pushes"),
+    LeftOut(
+        "sticking at a stop", "the mode at the stop", "static friction counts in what ends that one"
+    ),
+)
 LOWER, UPPER = "at lower stop", "at upper stop"
 
 
-def stop_cut(axis: Axis) -> tuple[Interval, ...]:
+def stop_cut(travel: Travel) -> tuple[Interval, ...]:
     """The two ends of the range, each of which holds what it stops."""
-    low, high = axis.ends
-    near, held = NEAR * (high - low), (axis.position, axis.velocity)
+    low, high = travel.ends
+    near, held = NEAR * (high - low), (travel.position, travel.velocity)
     return (
-        Interval(axis.prefix + LOWER, -np.inf, low + near, low, held),
-        Interval(axis.prefix + UPPER, high - near, np.inf, high, held),
+        Interval(travel.prefix + LOWER, -np.inf, low + near, low, held),
+        Interval(travel.prefix + UPPER, high - near, np.inf, high, held),
     )
 
 
-def guarded(hybrid: HybridModel, axis: Axis, mode: Mode) -> Mode:
+def guarded(hybrid: HybridModel, travel: Travel, mode: Mode) -> Mode:
     """The mode of a stop with what ends it: motion away, and a force that static friction loses to.
 
     The force is the rate of the velocity where friction hinders it most, affine in the pressures.
     """
     model = hybrid.model
-    away = 1 if mode.box[axis.position].label == axis.prefix + LOWER else -1
-    probes = away * np.linspace(axis.resting, axis.sliding, PROBES)
-    column = model.states.index(axis.velocity)
+    away = 1 if mode.box[travel.position].label == travel.prefix + LOWER else -1
+    probes = away * np.linspace(travel.resting, travel.sliding, PROBES)
+    column = model.states.index(travel.velocity)
     row = away * least_rate(model, whole_point(hybrid, mode), column, probes, away)
     names = (*model.states, *model.commands)
     pulled = {name: -float(w) for name, w in zip(names, row, strict=False) if w}
-    guards = (Guard({axis.velocity: -away}, axis.resting), Guard(pulled, -float(row[-1])))
+    guards = (Guard({travel.velocity: -away}, travel.resting), Guard(pulled, -float(row[-1])))
     return replace(mode, guards=guards)

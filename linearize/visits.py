@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+import casadi as ca
 import numpy as np
 
 from linearize.reduction import DesignModel
 from workbench.called import result
+from workbench.comparison.run import plant_for, run
 from workbench.effects.forces import EndStops
 from workbench.plant import Plant
 from workbench.recording import Recording
+from workbench.rig import Rig
 
 HORIZON_S = 0.05
 APART_S = 0.02  # between the starts of windows
@@ -50,10 +53,14 @@ class Windows:
     commands: np.ndarray
 
 
-def visited(model: DesignModel, plant: Plant, simulated: Recording) -> Visited:
+def visited(
+    model: DesignModel, plant: Plant, simulated: Recording, at_stops: bool = False
+) -> Visited:
     """What ``plant`` visits in its own simulation, which holds all of its states.
 
-    The commands of the design model are read off the plant: a command behind its dead zone.
+    The commands of the design model are read off the plant: a command behind its dead zone, or the
+    flow through a valve, which over each sample is the mean of those at its ends.  ``at_stops``
+    counts what is at an end stop too, for modes that hold it there.
 
     Raises
     ------
@@ -66,15 +73,63 @@ def visited(model: DesignModel, plant: Plant, simulated: Recording) -> Visited:
     )
     n = len(simulated)
     p = np.tile(plant.nominal[2][:, None], n)
-    behind = result(full.quantities(*model.commands).map(n), x, u, np.reshape(d, (-1, n)), p)
-    free = np.ones(n, dtype=bool)
+    behind = result(_commands(model, plant).map(n), x, u, np.reshape(d, (-1, n)), p)
+    flows = [name.endswith(".flow_kg_s") for name in model.commands]
+    behind[flows, :-1] = 0.5 * (behind[flows, 1:] + behind[flows, :-1])
+    free = np.full(n, True) if at_stops else _off_stops(plant, simulated)
+    states = simulated.rows(model.states)
+    return Visited(simulated.sample_time_s, states, behind, free, simulated.starts)
+
+
+def recorded_visits(
+    rig: Rig,
+    model: DesignModel,
+    recording: Recording,
+    at_stops: bool = False,
+    per_sample: int = 1,
+) -> Visited:
+    """What a rig's plant visits under a recording's inputs, so many times as finely sampled.
+
+    Inputs are held between samples, as they were when they were recorded.
+
+    Raises
+    ------
+    InputError
+        If a command or measured input is missing.
+    ArithmeticError
+        If the solution is not finite.
+    """
+    finer = replace(
+        recording,
+        sample_time_s=recording.sample_time_s / per_sample,
+        channels={name: np.repeat(row, per_sample) for name, row in recording.channels.items()},
+        starts=tuple(start * per_sample for start in recording.starts),
+    )
+    plant = plant_for(rig, finer).lean()
+    return visited(model, plant, run(rig, finer), at_stops)
+
+
+def _commands(model: DesignModel, plant: Plant) -> ca.Function:
+    """(x, u, d, p) of the plant -> commands of the design model, shape (n_u, 1)."""
+    full, read = plant.model, []
+    for name in model.commands:
+        member = name.rpartition(".")[0]
+        through = [value for (source, kind, to), value in full.flows.items()
+                   if (source, kind) == (member, "MassFlow") and to != "supply"]  # fmt: skip
+        flow = name.endswith(".flow_kg_s")
+        read.append(sum(through) if flow else full.conditions.read(name))
+    return ca.Function("commands", [*full.symbols], [ca.vertcat(*read)])
+
+
+def _off_stops(plant: Plant, simulated: Recording) -> np.ndarray:
+    """Where nothing touches an end stop, shape (n,)."""
+    free = np.ones(len(simulated), dtype=bool)
     for stop in plant.effects:
         name = f"{stop.body}.position_m" if isinstance(stop, EndStops) else ""
         if name in simulated.channels:
             at = simulated[name]
             free &= (at > float(stop.lower_m)) & (at < float(stop.upper_m))
-    states = simulated.rows(model.states)
-    return Visited(simulated.sample_time_s, states, behind, free, simulated.starts)
+    return free
 
 
 def windows(seen: Visited, horizon_s: float = HORIZON_S, apart_s: float = APART_S) -> Windows:
