@@ -25,6 +25,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import expm
 
 from linearize.cuts import Guard, Interval, Level, Region
 from linearize.equilibrium import OperatingPoint
@@ -33,20 +34,25 @@ from linearize.reduction import DesignModel
 from linearize.visits import Visited
 from workbench.called import called, result
 
-SAMPLES, CANDIDATES = 2000, 40  # of a manoeuvre; points tried in a box
+SAMPLES, CANDIDATES = 10000, 40  # of a manoeuvre; points tried in a box
 QUANTILES = np.linspace(0.05, 0.95, 19)
+FOLLOWED_S = 0.01  # a defect is followed for so long
 LEAST = 20  # samples of a box; boxes of fewer fit one manoeuvre and no other
 
 
 @dataclass(frozen=True)
 class _Region:
-    """A box with guards, its samples by number, the one where it is linearised, and sum of d^2."""
+    """A box with guards, its samples by number, the one where it is linearised, and sum of d^2.
+
+    A box that no sample visits keeps the mode that it came from.
+    """
 
     box: Box
     guards: tuple[Guard, ...]
     samples: np.ndarray
     point: int
     defect: float
+    given: Mode | None = None
 
 
 @dataclass(frozen=True)
@@ -64,9 +70,11 @@ class _Samples:
 
     z, rates      shapes (n, n_x + n_u) and (n, n_x)
     slopes        derivatives of the rates, shape (n, n_x, n_x + n_u)
+    touching      where something touches an end stop, shape (n,)
     """
 
     model: DesignModel
+    touching: np.ndarray
     z: np.ndarray
     rates: np.ndarray
     slopes: np.ndarray
@@ -76,17 +84,24 @@ class _Samples:
         return (*self.model.states, *self.model.commands)
 
     def defects(self, box: Box, at: np.ndarray, of: np.ndarray) -> np.ndarray:
-        """Squares of d, summed over states: models at some samples, of others; (n_at, n_of)."""
+        """Squares of e, summed over states: models at some samples, of others; (n_at, n_of)."""
         held = {name for interval in box.values() for name in interval.holds}
         kept = [i for i, name in enumerate(self.model.states) if name not in held]
         away = self.z[of][None] - self.z[at][:, None]
         slopes, rates = self.slopes[:, kept], self.rates[:, kept]
         foretold = rates[at][:, None] + np.einsum("aij,abj->abi", slopes[at], away)
-        return (((foretold - rates[of]) / self.model.scale[kept]) ** 2).sum(axis=2)
+        size = self.model.scale[kept]
+        own = self.slopes[at][:, kept][:, :, kept] * size / size[:, None]
+        missed = (foretold - rates[of]) / size
+        return ((missed @ _responses(own).transpose(0, 2, 1)) ** 2).sum(axis=2)
 
     def inside(self, box: Box, guards: tuple[Guard, ...]) -> np.ndarray:
-        """Which samples lie in a box where its guards hold, shape (n,)."""
-        found = np.ones(len(self.z), dtype=bool)
+        """Which samples lie in a box where its guards hold, shape (n,).
+
+        A stop is no part of a mode that holds nothing: an impact is over within a sample or two.
+        """
+        holding = any(region.holds for region in box.values())
+        found = np.full(len(self.z), True) if holding else ~self.touching
         signals = dict(zip(self.names, self.z.T, strict=True))
         for name, region in box.items():
             found &= region.contains(signals[name])
@@ -96,9 +111,6 @@ class _Samples:
 
     def region(self, box: Box, guards: tuple[Guard, ...], samples: np.ndarray) -> _Region:
         """A box with its samples, and the best of them to linearise at."""
-        if not len(samples):
-            told = " and ".join(f"'{region.label}' of {name}" for name, region in box.items())
-            raise ValueError(f"{self.model.plant.name}: the manoeuvre never visits {told}")
         tried = _some(samples)
         sums = self.defects(box, tried, samples).sum(axis=1)
         return _Region(box, guards, samples, int(tried[np.argmin(sums)]), float(sums.min()))
@@ -115,9 +127,11 @@ class _Samples:
 
     def best_split(self, region: _Region) -> _Split:
         """The cut of a region that gains most; no gain where it cannot be cut."""
+        splits = [_Split(0.0, "", 0.0)]
+        if region.given:
+            return splits[0]
         tried = _some(region.samples)
         defects = self.defects(region.box, tried, region.samples)
-        splits = [_Split(0.0, "", 0.0)]
         for column, name in enumerate(self.names):
             if name in region.box and _kept(region.box[name]):
                 continue
@@ -136,6 +150,8 @@ class _Samples:
 
     def mode(self, region: _Region) -> Mode:
         """The mode of a region; what is held is linearised at rest."""
+        if region.given:
+            return replace(region.given, box=region.box)
         z, n = self.z[region.point].copy(), len(self.model.states)
         for name, part in region.box.items():
             if _kept(part):
@@ -148,19 +164,23 @@ class _Samples:
         return replace(made, guards=region.guards)
 
 
-def placed_modes(hybrid: HybridModel, seen: Visited, number: int) -> HybridModel:
+def placed_modes(
+    hybrid: HybridModel, seen: Visited, number: int, keeping: tuple[str, ...] = ()
+) -> HybridModel:
     """So many modes of a plant, placed where a manoeuvre goes.
 
-    ``hybrid`` tells the plant and which intervals hold states; its other cuts do not count.
+    ``hybrid`` tells the plant and which intervals hold states; of its other cuts only those of the
+    signals in ``keeping`` stay.  What
+    holds where the manoeuvre never goes keeps the mode, and the point, that it has there.
 
     Raises
     ------
     ValueError
-        If there are fewer modes than holding intervals and their neighbours need, if the manoeuvre
-        misses one of those, or if it has too few samples for so many modes.
+        If there are fewer modes than holding intervals and their neighbours need, or if the
+        manoeuvre has too few samples for so many modes.
     """
     last = None
-    for last in growing_modes(hybrid, seen):
+    for last in growing_modes(hybrid, seen, keeping):
         if len(last.modes) >= number:
             break
     if len(last.modes) == number:
@@ -172,10 +192,12 @@ def placed_modes(hybrid: HybridModel, seen: Visited, number: int) -> HybridModel
     raise ValueError(f"{hybrid.model.plant.name}: {number} modes asked for, expected {bound}")
 
 
-def growing_modes(hybrid: HybridModel, seen: Visited) -> Iterator[HybridModel]:
+def growing_modes(
+    hybrid: HybridModel, seen: Visited, keeping: tuple[str, ...] = ()
+) -> Iterator[HybridModel]:
     """The same, by number of modes: from the holding intervals alone on, one more each time."""
     samples = _samples(hybrid.model, seen)
-    regions = _begin(hybrid, samples)
+    regions = _begin(hybrid, samples, keeping)
     modes = [samples.mode(region) for region in regions]
     splits = [samples.best_split(region) for region in regions]
     while True:
@@ -189,13 +211,23 @@ def growing_modes(hybrid: HybridModel, seen: Visited) -> Iterator[HybridModel]:
         splits[k : k + 1] = [samples.best_split(half) for half in halves]
 
 
-def _begin(hybrid: HybridModel, samples: _Samples) -> list[_Region]:
+def _responses(A: np.ndarray) -> np.ndarray:
+    """Integral of exp(A t) over the time that a defect is followed, shape (n_at, n, n)."""
+    n = A.shape[-1]
+    block = np.zeros((len(A), 2 * n, 2 * n))
+    block[:, :n, :n], block[:, :n, n:] = A, np.eye(n)
+    return expm(block * FOLLOWED_S)[:, :n, n:]
+
+
+def _begin(
+    hybrid: HybridModel, samples: _Samples, keeping: tuple[str, ...]
+) -> list[_Region]:
     """The boxes of a hybrid model without the cuts that may be chosen; the first that holds counts.
 
     What stays is each signal that somewhere holds states or is switched.
     """
     every = [item for mode in hybrid.modes for item in mode.box.items()]
-    staying = {name for name, region in every if _kept(region)}
+    staying = {name for name, region in every if _kept(region) or name in keeping}
     found, begun = [], []
     left = np.ones(len(samples.z), dtype=bool)
     for mode in hybrid.modes:
@@ -204,8 +236,11 @@ def _begin(hybrid: HybridModel, samples: _Samples) -> list[_Region]:
             continue
         begun.append((box, mode.guards))
         inside = left & samples.inside(box, mode.guards)
-        found.append(samples.region(box, mode.guards, np.flatnonzero(inside)))
         left &= ~inside
+        if inside.any():
+            found.append(samples.region(box, mode.guards, np.flatnonzero(inside)))
+        else:
+            found.append(_Region(box, mode.guards, np.zeros(0, int), -1, 0.0, mode))
     return found
 
 
@@ -215,12 +250,13 @@ def _kept(region: Region) -> bool:
 
 
 def _samples(model: DesignModel, seen: Visited) -> _Samples:
-    rows = seen.rows[:, :: max(seen.rows.shape[1] // SAMPLES, 1)]
+    every = slice(None, None, max(seen.rows.shape[1] // SAMPLES, 1))
+    rows, touching = seen.rows[:, every], seen.touching[seen.free][every]
     n, count = len(model.states), rows.shape[1]
     rates = result(model.f.map(count), rows[:n], rows[n:])
     A, B, _, _ = called(model.jacobians.map(count), rows[:n], rows[n:])
     slopes = [block.reshape(n, count, -1).transpose(1, 0, 2) for block in (A, B)]
-    return _Samples(model, rows.T, rates.T, np.concatenate(slopes, axis=2))
+    return _Samples(model, touching, rows.T, rates.T, np.concatenate(slopes, axis=2))
 
 
 def _some(samples: np.ndarray) -> np.ndarray:

@@ -26,6 +26,7 @@ from workbench.effects.valve_hysteresis import ValveHysteresis
 from workbench.floating_piston import ControlChamber
 from workbench.plant import Plant
 
+FLOW_KG_S = 1e-2  # typical size of a flow that is a command
 # Effects whose states a design does without.
 INSIDE = (BristleFriction, SensorLag, SupplyDroop, ValveHysteresis, ValveLag)
 
@@ -95,6 +96,12 @@ class DesignModel:
         """Typical size of each state, shape (n_x,)."""
         sizes = {name: state.scale for name, state in self.plant.state_list.items()}
         return np.array([sizes[name] for name in self.states])
+
+    @cached_property
+    def command_scale(self) -> np.ndarray:
+        """Typical size of each command, shape (n_u,): a tenth of its range, of a flow 10 g/s."""
+        ranges = [signal.upper - signal.lower for signal in self.plant.commands]
+        return np.array([0.1 * wide if np.isfinite(wide) else FLOW_KG_S for wide in ranges])
 
     @cached_property
     def initial(self) -> np.ndarray:

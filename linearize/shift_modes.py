@@ -9,7 +9,7 @@ Source: paper 003 Sec. V; physics.md 4.2.  The operating points are chosen.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from math import inf
 
@@ -18,16 +18,24 @@ import numpy as np
 
 from linearize.axis import Travel
 from linearize.cuts import Guard, Interval, Level, Region
-from linearize.equilibrium import operating_point
-from linearize.modes import HybridModel, Mode, at_points, hybrid_modes, linearised, placed_at
+from linearize.equilibrium import OperatingPoint, operating_point
+from linearize.modes import (
+    Box,
+    HybridModel,
+    Mode,
+    Placing,
+    hybrid_modes,
+    linearised,
+    placed_at,
+)
 from linearize.reduction import DesignModel
 from linearize.shifting import (
     FLOWS,
-    HEAT,
+    MASSES,
     POSITION,
     PRESSURES,
     VELOCITY,
-    Omission,
+    driving_model,
     shift_model,
     switched_shift_model,
 )
@@ -39,6 +47,8 @@ from workbench.plants.gearbox import COMMANDS, MAIN
 
 NEUTRAL_M, NEUTRAL_M_S = 1e-4, 1e-2  # held where it is nearer and slower than this
 BESIDE_M = 1e-9  # to either side of Neutral
+AT_NEUTRAL = Interval("held at Neutral", -NEUTRAL_M, NEUTRAL_M, 0.0, (POSITION, VELOCITY))
+HALFWAY, ENDS = 0.45, (1e-3, 1.0 - 1e-3)  # of a travel: both seats full; the points
 SLIDING_M_S = 0.1  # dry friction is all there: tanh(100)
 
 DIRECTIONS = {
@@ -106,20 +116,18 @@ def switched_modes(
     What the valves pass stands in A and in the drift.
     """
     points, model = points or ShiftPoints(), model or switched_shift_model(plant)
-    cuts: dict[str, tuple[Region, ...]] = {POSITION: side_cut(model, pieces)}
-    for number, command in enumerate(COMMANDS):
-        labels = (f"{number + 1} {label}" for label, _ in points.by_valve)
-        cuts[command] = tuple(map(Level, labels, (0.0, 1.0)))
+    cuts = {POSITION: side_cut(model, pieces), **valve_cut(points)}
     return hybrid_modes(plant, cuts, _placing(COMMANDS, points), model)
 
 
-def sliding_modes(plant: Plant, omitted: tuple[Omission, ...] = (HEAT,)) -> HybridModel:
-    """Sides x {slide -, stick, slide +}, held at Neutral and at both ends, under mass flows.
+def driving_modes(plant: Plant) -> HybridModel:
+    """Valves x {sides x {slide -, stick, slide +}, held at Neutral and at both ends}: 36 modes.
 
-    Dry friction and detent stay: over 50 ms of driving the piston stands as long as it moves, and
-    it stands by them.  What :func:`linearize.placement.placed_modes` begins with.
+    Over 50 ms of driving the piston stands as long as it moves, by dry friction and detent, while
+    the chambers fill and empty: see :func:`linearize.shifting.driving_model`.  What
+    :func:`linearize.placement.placed_modes` begins with.
     """
-    model = shift_model(plant, omitted)
+    model, placing = driving_model(plant), _at_room_temperature(plant)
     travel = Travel(
         position=POSITION,
         velocity=VELOCITY,
@@ -127,12 +135,54 @@ def sliding_modes(plant: Plant, omitted: tuple[Omission, ...] = (HEAT,)) -> Hybr
         sliding=SLIDING_M_S,
         ends=(-_stroke_m(model), _stroke_m(model)),
     )
-    cuts = {POSITION: side_cut(model), VELOCITY: travel.friction_cut()}
-    free = hybrid_modes(plant, cuts, at_points, model)
-    ends = (hybrid_modes(plant, {POSITION: (end,)}, at_points, model) for end in stop_cut(travel))
-    stopped = (guarded(each, travel, mode) for each in ends for mode in each.modes)
-    modes = (held_at_neutral(model), *stopped, *free.modes)
-    return HybridModel(plant, model, modes, AT_STOPS)
+    valves = travel_cut()
+
+    def made(cuts: Mapping[str, Iterable[Region]]) -> tuple[Mode, ...]:
+        return hybrid_modes(plant, {**cuts, **valves}, placing, model).modes
+
+    guards = neutral_guards(model)
+    neutral = (replace(mode, guards=guards) for mode in made({POSITION: (AT_NEUTRAL,)}))
+    ends = [(end, HybridModel(plant, model, made({POSITION: (end,)}))) for end in stop_cut(travel)]
+    stopped = (guarded(each, travel, mode) for _, each in ends for mode in each.modes)
+    free = made({POSITION: side_cut(model), VELOCITY: travel.friction_cut()})
+    return HybridModel(plant, model, (*neutral, *stopped, *free), AT_STOPS)
+
+
+def travel_cut() -> dict[str, tuple[Interval, ...]]:
+    """Each armature in the half in which its inlet opens, and in that in which its exhaust shuts.
+
+    A seat is as open as its bore from a quarter of that on: in each half one hole follows the
+    travel, and the other one is full.
+    """
+    return {
+        command: (
+            Interval(f"{number + 1} vents", -inf, HALFWAY, ENDS[0]),
+            Interval(f"{number + 1} charges", HALFWAY, inf, ENDS[1]),
+        )
+        for number, command in enumerate(COMMANDS)
+    }
+
+
+def valve_cut(points: ShiftPoints) -> dict[str, tuple[Level, ...]]:
+    """Each valve released and energised."""
+    labels = [label for label, _ in points.by_valve]
+    return {
+        command: tuple(map(Level, (f"{number + 1} {label}" for label in labels), (0.0, 1.0)))
+        for number, command in enumerate(COMMANDS)
+    }
+
+
+def _at_room_temperature(plant: Plant) -> Placing:
+    """Each cut signal at its point, vented, with the gas at the temperature of the supply."""
+    thin = shift_model(plant)
+
+    def placed(model: DesignModel, box: Box) -> OperatingPoint:
+        at = {name: region.point for name, region in box.items()}
+        x = [at.get(n, v) for n, v in zip(thin.states, thin.initial, strict=True)]
+        whole = dict(zip(thin.plant.model.states, thin.full(x).full().ravel(), strict=True))
+        return operating_point(model, {name: float(whole[name]) for name in MASSES} | at)
+
+    return placed
 
 
 def side_cut(model: DesignModel, pieces: int = 1) -> tuple[Interval, ...]:
@@ -148,8 +198,8 @@ def side_cut(model: DesignModel, pieces: int = 1) -> tuple[Interval, ...]:
         {"Low side": (-stroke_m, 0.0), "High side": (0.0, stroke_m)}.items()
     ):
         places_m = np.linspace(*ends_m, 1001)
-        state = [np.full(1001, model.initial[0]), np.full(1001, model.initial[1])]
-        x = np.vstack([*state, places_m, 0.0 * places_m])
+        x = np.tile(model.initial[:, None], len(places_m))
+        x[model.states.index(POSITION)] = places_m
         sizes = np.log(volume(x, model.plant.nominal[0]).full()[row])
         steps = np.interp(np.linspace(0.0, 1.0, 2 * pieces + 1), *_rising(sizes, places_m))
         ends = (-inf, 0.0) if row == 0 else (0.0, inf)
@@ -166,11 +216,14 @@ def held_at_neutral(model: DesignModel, points: ShiftPoints | None = None) -> Mo
     Both forces are linear in the pressures; they are read off the model on either side.
     """
     half_pa = (points or ShiftPoints()).charging_pa
-    box = {POSITION: Interval("held at Neutral", -NEUTRAL_M, NEUTRAL_M, 0.0, (POSITION, VELOCITY))}
     point = operating_point(model, {**dict.fromkeys(PRESSURES, half_pa), POSITION: 0.0})
+    return replace(linearised(model, {POSITION: AT_NEUTRAL}, point), guards=neutral_guards(model))
+
+
+def neutral_guards(model: DesignModel) -> tuple[Guard, ...]:
+    """Slow, and pushed to Neutral from both sides."""
     slow = (Guard({VELOCITY: sign}, NEUTRAL_M_S) for sign in (1.0, -1.0))
-    pushed = (_push(model, sign) for sign in (-1.0, 1.0))
-    return replace(linearised(model, box, point), guards=(*slow, *pushed))
+    return (*slow, *(_push(model, sign) for sign in (-1.0, 1.0)))
 
 
 def valve_flows(plant: Plant) -> Callable[[float, float], np.ndarray]:
@@ -201,12 +254,13 @@ def _placing(inputs: tuple[str, str], points: ShiftPoints):
 
 def _push(model: DesignModel, side: float) -> Guard:
     """The force at rest on one side of Neutral, over the mass, towards it."""
-    x = np.array([0.0, 0.0, side * BESIDE_M, 0.0])
-    u = np.zeros(len(model.commands))
-    slope = model.jacobians(x, u)[0].full()[3]
-    offset = float(model.f(x, u)[0][3])
-    weights = {name: -side * float(slope[k]) for k, name in enumerate(PRESSURES)}
-    return Guard(weights, -side * offset)
+    x, u = model.initial.copy(), np.zeros(len(model.commands))
+    x[model.states.index(POSITION)], row = side * BESIDE_M, model.states.index(VELOCITY)
+    columns = [model.states.index(name) for name in PRESSURES]
+    slope = model.jacobians(x, u)[0].full()[row, columns]
+    offset = float(model.f(x, u)[0][row]) - slope @ x[columns]
+    weights = dict(zip(PRESSURES, map(float, -side * slope), strict=True))
+    return Guard(weights, -side * float(offset))
 
 
 def _rising(values: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

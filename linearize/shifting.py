@@ -27,6 +27,7 @@ from workbench.sources import FlowSource
 POSITION, VELOCITY = f"{MAIN}.position_m", f"{MAIN}.velocity_m_s"
 PRESSURES = ("chamber_1.pressure_pa", "chamber_2.pressure_pa")
 STATES = (*PRESSURES, POSITION, VELOCITY)
+MASSES = ("chamber_1.mass_kg", "chamber_2.mass_kg")
 FLOWS = ("valve_1.flow_kg_s", "valve_2.flow_kg_s")
 
 
@@ -70,9 +71,12 @@ RIGID = (
     ),
     LeftOut("finger", "one body with the main piston", "a joint of 5e6 N/m is no part of a design"),
     LeftOut("control_chamber.pressure_pa", "ambient pressure", "its port is wide"),
-    LeftOut("mass of gas", "gas at supply temperature", "temperature moves the flow by per cents"),
 )
+GAS = LeftOut("mass of gas", "gas at supply temperature", "temperature moves the flow by per cents")
 SWITCHED = LeftOut("solenoids", "armature at the end its command drives it to", "over in 4 to 7 ms")
+TRAVELS = LeftOut(
+    "solenoids", "the travels of their armatures, 0 to 1, as commands", "current and force lie before"
+)
 REPLACED = LeftOut("solenoids", "their mass flows as commands", "the input of the paper")
 
 
@@ -108,11 +112,27 @@ def switched_shift_model(plant: Plant, omitted: tuple[Omission, ...] = OMITTED) 
     return _reduced(plant.lean(), SWITCHED, omitted)
 
 
+def driving_model(plant: Plant) -> DesignModel:
+    """The gearbox on (p1, p2, m1, m2, x, v), with the travels of the armatures as commands.
+
+    For longer than a shift: under given flows a pressure that was once wrong stays so, while behind
+    a hole it goes where it must; and gas that expands through one cools by some 80 K.
+    """
+    whole = _reduced(plant.lean(), TRAVELS, ())
+    commands = tuple(replace(signal, levels=()) for signal in whole.plant.commands)
+    return replace(
+        whole,
+        plant=replace(whole.plant, commands=commands),
+        states=(*PRESSURES, *MASSES, POSITION, VELOCITY),
+        left_out=tuple(item for item in whole.left_out if item is not GAS),
+    )
+
+
 def _reduced(plant: Plant, valves: LeftOut, omitted: tuple[Omission, ...]) -> DesignModel:
     return DesignModel(
         plant=plant,
         states=STATES,
-        left_out=(valves, *RIGID, *(each.left_out for each in omitted), *_slow(plant)),
+        left_out=(valves, *RIGID, GAS, *(each.left_out for each in omitted), *_slow(plant)),
         nulls=dict(pair for each in omitted for pair in each.nulls(plant)),
         couplings=tuple(couplings(plant)),
     )

@@ -11,6 +11,7 @@ from linearize.reduction import DesignModel
 from workbench.called import result
 from workbench.comparison.run import plant_for, run
 from workbench.effects.forces import EndStops
+from workbench.effects.solenoid_valve import SolenoidValve
 from workbench.plant import Plant
 from workbench.recording import Recording
 from workbench.rig import Rig
@@ -25,19 +26,22 @@ class Visited:
 
     states        shape (n_x, n)
     commands      behind the dead zone, shape (n_u, n)
-    free          where nothing touches an end stop, shape (n,): the modes are those of free motion
+    touching      where something touches an end stop, shape (n,)
+    free          what the modes are to stand for, shape (n,): all that does not touch, or everything
+                  where modes hold what stands at a stop
     starts        first sample of each gap-free piece
     """
 
     sample_time_s: float
     states: np.ndarray
     commands: np.ndarray
+    touching: np.ndarray
     free: np.ndarray
     starts: tuple[int, ...]
 
     @property
     def rows(self) -> np.ndarray:
-        """States, then commands, at the samples of free motion; shape (n_x + n_u, n_free)."""
+        """States, then commands, at the samples that count; shape (n_x + n_u, n_free)."""
         return np.vstack([self.states, self.commands])[:, self.free]
 
 
@@ -58,9 +62,9 @@ def visited(
 ) -> Visited:
     """What ``plant`` visits in its own simulation, which holds all of its states.
 
-    The commands of the design model are read off the plant: a command behind its dead zone, or the
-    flow through a valve, which over each sample is the mean of those at its ends.  ``at_stops``
-    counts what is at an end stop too, for modes that hold it there.
+    The commands of the design model are read off the plant: a command behind its dead zone; of a
+    solenoid valve the travel of its armature, 0 to 1.  ``at_stops`` counts what is at an end stop
+    too, for modes that hold it there.
 
     Raises
     ------
@@ -74,11 +78,10 @@ def visited(
     n = len(simulated)
     p = np.tile(plant.nominal[2][:, None], n)
     behind = result(_commands(model, plant).map(n), x, u, np.reshape(d, (-1, n)), p)
-    flows = [name.endswith(".flow_kg_s") for name in model.commands]
-    behind[flows, :-1] = 0.5 * (behind[flows, 1:] + behind[flows, :-1])
-    free = np.full(n, True) if at_stops else _off_stops(plant, simulated)
+    touching = _at_stops(model, plant, simulated)
+    free = np.full(n, True) if at_stops else ~touching
     states = simulated.rows(model.states)
-    return Visited(simulated.sample_time_s, states, behind, free, simulated.starts)
+    return Visited(simulated.sample_time_s, states, behind, touching, free, simulated.starts)
 
 
 def recorded_visits(
@@ -111,29 +114,31 @@ def recorded_visits(
 
 def _commands(model: DesignModel, plant: Plant) -> ca.Function:
     """(x, u, d, p) of the plant -> commands of the design model, shape (n_u, 1)."""
-    full, read = plant.model, []
+    now, read = plant.model.conditions, []
+    solenoids = {f"{e.name}.command": e for e in plant.effects if isinstance(e, SolenoidValve)}
     for name in model.commands:
-        member = name.rpartition(".")[0]
-        through = [value for (source, kind, to), value in full.flows.items()
-                   if (source, kind) == (member, "MassFlow") and to != "supply"]  # fmt: skip
-        flow = name.endswith(".flow_kg_s")
-        read.append(sum(through) if flow else full.conditions.read(name))
-    return ca.Function("commands", [*full.symbols], [ca.vertcat(*read)])
+        if name in solenoids:
+            valve = solenoids[name]
+            travel = now[valve.name].armature_position_m / valve.full_lift_m
+            read.append(ca.fmin(ca.fmax(travel, 0.0), 1.0))
+        else:
+            read.append(now.read(name))
+    return ca.Function("commands", [*plant.model.symbols], [ca.vertcat(*read)])
 
 
-def _off_stops(plant: Plant, simulated: Recording) -> np.ndarray:
-    """Where nothing touches an end stop, shape (n,)."""
-    free = np.ones(len(simulated), dtype=bool)
+def _at_stops(model: DesignModel, plant: Plant, simulated: Recording) -> np.ndarray:
+    """Where something that moves in the design model touches an end stop, shape (n,)."""
+    touching = np.zeros(len(simulated), dtype=bool)
     for stop in plant.effects:
         name = f"{stop.body}.position_m" if isinstance(stop, EndStops) else ""
-        if name in simulated.channels:
+        if name in model.states:
             at = simulated[name]
-            free &= (at > float(stop.lower_m)) & (at < float(stop.upper_m))
-    return free
+            touching |= (at <= float(stop.lower_m)) | (at >= float(stop.upper_m))
+    return touching
 
 
 def windows(seen: Visited, horizon_s: float = HORIZON_S, apart_s: float = APART_S) -> Windows:
-    """Windows of free motion, none across a gap.
+    """Windows of samples that all count, none across a gap.
 
     Raises
     ------
