@@ -29,12 +29,13 @@ from scipy.linalg import expm
 
 from linearize.cuts import Guard, Interval, Level, Region
 from linearize.equilibrium import OperatingPoint
+from linearize.holding import resting_states
 from linearize.modes import Box, HybridModel, Mode, linearised
 from linearize.reduction import DesignModel
 from linearize.visits import Visited
 from workbench.called import called, result
 
-SAMPLES, CANDIDATES = 10000, 40  # of a manoeuvre; points tried in a box
+SAMPLES, CANDIDATES = 20000, 40  # of a manoeuvre; points tried in a box
 QUANTILES = np.linspace(0.05, 0.95, 19)
 FOLLOWED_S = 0.01  # a defect is followed for so long
 LEAST = 20  # samples of a box; boxes of fewer fit one manoeuvre and no other
@@ -44,7 +45,8 @@ LEAST = 20  # samples of a box; boxes of fewer fit one manoeuvre and no other
 class _Region:
     """A box with guards, its samples by number, the one where it is linearised, and sum of d^2.
 
-    A box that no sample visits keeps the mode that it came from.
+    ``resting`` are signals that are zero in it.  A box that no sample visits keeps the mode that it
+    came from.
     """
 
     box: Box
@@ -52,6 +54,7 @@ class _Region:
     samples: np.ndarray
     point: int
     defect: float
+    resting: tuple[str, ...] = ()
     given: Mode | None = None
 
 
@@ -109,11 +112,14 @@ class _Samples:
             found &= guard.holds(signals)
         return found
 
-    def region(self, box: Box, guards: tuple[Guard, ...], samples: np.ndarray) -> _Region:
+    def region(
+        self, box: Box, guards: tuple[Guard, ...], samples: np.ndarray, resting: tuple[str, ...]
+    ) -> _Region:
         """A box with its samples, and the best of them to linearise at."""
         tried = _some(samples)
         sums = self.defects(box, tried, samples).sum(axis=1)
-        return _Region(box, guards, samples, int(tried[np.argmin(sums)]), float(sums.min()))
+        best = int(tried[np.argmin(sums)])
+        return _Region(box, guards, samples, best, float(sums.min()), resting)
 
     def halves(self, region: _Region, split: _Split) -> tuple[_Region, _Region]:
         """A region cut in two."""
@@ -123,7 +129,7 @@ class _Samples:
         boxes = ({**region.box, signal: side} for side in sides)
         low = self.z[region.samples, self.names.index(signal)] < split.at
         pairs = zip(boxes, (region.samples[low], region.samples[~low]), strict=True)
-        return tuple(self.region(box, region.guards, samples) for box, samples in pairs)
+        return tuple(self.region(box, region.guards, each, region.resting) for box, each in pairs)
 
     def best_split(self, region: _Region) -> _Split:
         """The cut of a region that gains most; no gain where it cannot be cut."""
@@ -133,7 +139,7 @@ class _Samples:
         tried = _some(region.samples)
         defects = self.defects(region.box, tried, region.samples)
         for column, name in enumerate(self.names):
-            if name in region.box and _kept(region.box[name]):
+            if name in region.resting or (name in region.box and _kept(region.box[name])):
                 continue
             values = self.z[region.samples, column]
             cuts = np.unique(np.quantile(values, QUANTILES))
@@ -238,9 +244,10 @@ def _begin(
         inside = left & samples.inside(box, mode.guards)
         left &= ~inside
         if inside.any():
-            found.append(samples.region(box, mode.guards, np.flatnonzero(inside)))
+            resting = resting_states(hybrid, mode)
+            found.append(samples.region(box, mode.guards, np.flatnonzero(inside), resting))
         else:
-            found.append(_Region(box, mode.guards, np.zeros(0, int), -1, 0.0, mode))
+            found.append(_Region(box, mode.guards, np.zeros(0, int), -1, 0.0, given=mode))
     return found
 
 

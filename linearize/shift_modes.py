@@ -48,7 +48,6 @@ from workbench.plants.gearbox import COMMANDS, MAIN
 NEUTRAL_M, NEUTRAL_M_S = 1e-4, 1e-2  # held where it is nearer and slower than this
 BESIDE_M = 1e-9  # to either side of Neutral
 AT_NEUTRAL = Interval("held at Neutral", -NEUTRAL_M, NEUTRAL_M, 0.0, (POSITION, VELOCITY))
-HALFWAY, ENDS = 0.45, (1e-3, 1.0 - 1e-3)  # of a travel: both seats full; the points
 SLIDING_M_S = 0.1  # dry friction is all there: tanh(100)
 
 DIRECTIONS = {
@@ -121,7 +120,7 @@ def switched_modes(
 
 
 def driving_modes(plant: Plant) -> HybridModel:
-    """Valves x {sides x {slide -, stick, slide +}, held at Neutral and at both ends}: 36 modes.
+    """Sides x {slide -, stick, slide +}, held at Neutral and at both ends, under mass flows.
 
     Over 50 ms of driving the piston stands as long as it moves, by dry friction and detent, while
     the chambers fill and empty: see :func:`linearize.shifting.driving_model`.  What
@@ -135,32 +134,29 @@ def driving_modes(plant: Plant) -> HybridModel:
         sliding=SLIDING_M_S,
         ends=(-_stroke_m(model), _stroke_m(model)),
     )
-    valves = travel_cut()
 
-    def made(cuts: Mapping[str, Iterable[Region]]) -> tuple[Mode, ...]:
-        return hybrid_modes(plant, {**cuts, **valves}, placing, model).modes
+    def made(cuts: Mapping[str, Iterable[Region]]) -> HybridModel:
+        return hybrid_modes(plant, cuts, placing, model)
 
-    guards = neutral_guards(model)
-    neutral = (replace(mode, guards=guards) for mode in made({POSITION: (AT_NEUTRAL,)}))
-    ends = [(end, HybridModel(plant, model, made({POSITION: (end,)}))) for end in stop_cut(travel)]
-    stopped = (guarded(each, travel, mode) for _, each in ends for mode in each.modes)
-    free = made({POSITION: side_cut(model), VELOCITY: travel.friction_cut()})
-    return HybridModel(plant, model, (*neutral, *stopped, *free), AT_STOPS)
+    (neutral,) = made({POSITION: (AT_NEUTRAL,)}).modes
+    neutral = replace(neutral, guards=neutral_guards(model))
+    ends = (made({POSITION: (end,)}) for end in stop_cut(travel))
+    stopped = (guarded(each, travel, mode) for each in ends for mode in each.modes)
+    free = made({POSITION: side_cut(model), VELOCITY: travel.friction_cut()}).modes
+    return HybridModel(plant, model, (neutral, *stopped, *free), AT_STOPS)
 
 
-def travel_cut() -> dict[str, tuple[Interval, ...]]:
-    """Each armature in the half in which its inlet opens, and in that in which its exhaust shuts.
+def _at_room_temperature(plant: Plant) -> Placing:
+    """Each cut signal at its point, vented, with the gas at the temperature of the supply."""
+    thin = shift_model(plant)
 
-    A seat is as open as its bore from a quarter of that on: in each half one hole follows the
-    travel, and the other one is full.
-    """
-    return {
-        command: (
-            Interval(f"{number + 1} vents", -inf, HALFWAY, ENDS[0]),
-            Interval(f"{number + 1} charges", HALFWAY, inf, ENDS[1]),
-        )
-        for number, command in enumerate(COMMANDS)
-    }
+    def placed(model: DesignModel, box: Box) -> OperatingPoint:
+        at = {name: region.point for name, region in box.items()}
+        x = [at.get(n, v) for n, v in zip(thin.states, thin.initial, strict=True)]
+        whole = dict(zip(thin.plant.model.states, thin.full(x).full().ravel(), strict=True))
+        return operating_point(model, {name: float(whole[name]) for name in MASSES} | at)
+
+    return placed
 
 
 def valve_cut(points: ShiftPoints) -> dict[str, tuple[Level, ...]]:

@@ -74,9 +74,6 @@ RIGID = (
 )
 GAS = LeftOut("mass of gas", "gas at supply temperature", "temperature moves the flow by per cents")
 SWITCHED = LeftOut("solenoids", "armature at the end its command drives it to", "over in 4 to 7 ms")
-TRAVELS = LeftOut(
-    "solenoids", "the travels of their armatures, 0 to 1, as commands", "current and force lie before"
-)
 REPLACED = LeftOut("solenoids", "their mass flows as commands", "the input of the paper")
 
 
@@ -113,19 +110,14 @@ def switched_shift_model(plant: Plant, omitted: tuple[Omission, ...] = OMITTED) 
 
 
 def driving_model(plant: Plant) -> DesignModel:
-    """The gearbox on (p1, p2, m1, m2, x, v), with the travels of the armatures as commands.
+    """The gearbox on (p1, p2, m1, m2, x, v), with the two mass flows as commands.
 
-    For longer than a shift: under given flows a pressure that was once wrong stays so, while behind
-    a hole it goes where it must; and gas that expands through one cools by some 80 K.
+    For longer than a shift: dry friction and detent hold the piston between shifts, and gas that
+    expands through a valve cools by some 80 K.
     """
-    whole = _reduced(plant.lean(), TRAVELS, ())
-    commands = tuple(replace(signal, levels=()) for signal in whole.plant.commands)
-    return replace(
-        whole,
-        plant=replace(whole.plant, commands=commands),
-        states=(*PRESSURES, *MASSES, POSITION, VELOCITY),
-        left_out=tuple(item for item in whole.left_out if item is not GAS),
-    )
+    whole = _reduced(fed_by_flows(plant.lean()), REPLACED, ())
+    left_out = tuple(item for item in whole.left_out if item is not GAS)
+    return replace(whole, states=(*PRESSURES, *MASSES, POSITION, VELOCITY), left_out=left_out)
 
 
 def _reduced(plant: Plant, valves: LeftOut, omitted: tuple[Omission, ...]) -> DesignModel:

@@ -44,6 +44,8 @@ def guarded(hybrid: HybridModel, travel: Travel, mode: Mode) -> Mode:
     """The mode of a stop with what ends it: motion away, and a force that static friction loses to.
 
     The force is the rate of the velocity where friction hinders it most, affine in the pressures.
+    What comes against the stop faster than it rests is stopped whatever the force: that speed
+    outweighs what the supply's pressure can do.
     """
     model = hybrid.model
     away = 1 if mode.box[travel.position].label == travel.prefix + LOWER else -1
@@ -52,5 +54,8 @@ def guarded(hybrid: HybridModel, travel: Travel, mode: Mode) -> Mode:
     row = away * least_rate(model, whole_point(hybrid, mode), column, probes, away)
     names = (*model.states, *model.commands)
     pulled = {name: -float(w) for name, w in zip(names, row, strict=False) if w}
+    supply_pa = float(model.quantities("supply.pressure_pa")(model.initial, model.plant.nominal[0]))
+    strongest = max(abs(w) for name, w in pulled.items() if name.endswith("_pa")) * supply_pa
+    pulled[travel.velocity] = -away * strongest / travel.resting
     guards = (Guard({travel.velocity: -away}, travel.resting), Guard(pulled, -float(row[-1])))
     return replace(mode, guards=guards)

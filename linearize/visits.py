@@ -62,9 +62,9 @@ def visited(
 ) -> Visited:
     """What ``plant`` visits in its own simulation, which holds all of its states.
 
-    The commands of the design model are read off the plant: a command behind its dead zone; of a
-    solenoid valve the travel of its armature, 0 to 1.  ``at_stops`` counts what is at an end stop
-    too, for modes that hold it there.
+    The commands of the design model are read off the plant: a command behind its dead zone, or of a
+    solenoid valve the flow through it, which over each sample is the mean of those at its ends.
+    ``at_stops`` counts what is at an end stop too, for modes that hold it there.
 
     Raises
     ------
@@ -78,6 +78,8 @@ def visited(
     n = len(simulated)
     p = np.tile(plant.nominal[2][:, None], n)
     behind = result(_commands(model, plant).map(n), x, u, np.reshape(d, (-1, n)), p)
+    flows = [name.endswith(".flow_kg_s") for name in model.commands]
+    behind[flows, :-1] = 0.5 * (behind[flows, 1:] + behind[flows, :-1])
     touching = _at_stops(model, plant, simulated)
     free = np.full(n, True) if at_stops else ~touching
     states = simulated.rows(model.states)
@@ -115,12 +117,10 @@ def recorded_visits(
 def _commands(model: DesignModel, plant: Plant) -> ca.Function:
     """(x, u, d, p) of the plant -> commands of the design model, shape (n_u, 1)."""
     now, read = plant.model.conditions, []
-    solenoids = {f"{e.name}.command": e for e in plant.effects if isinstance(e, SolenoidValve)}
+    valves = {f"{e.name}.flow_kg_s": e for e in plant.effects if isinstance(e, SolenoidValve)}
     for name in model.commands:
-        if name in solenoids:
-            valve = solenoids[name]
-            travel = now[valve.name].armature_position_m / valve.full_lift_m
-            read.append(ca.fmin(ca.fmax(travel, 0.0), 1.0))
+        if name in valves:
+            read.append(plant.model.flows[valves[name].name, "MassFlow", valves[name].chamber])
         else:
             read.append(now.read(name))
     return ca.Function("commands", [*plant.model.symbols], [ca.vertcat(*read)])
