@@ -25,7 +25,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import expm
 
 from linearize.cuts import Guard, Interval, Level, Region
 from linearize.equilibrium import OperatingPoint
@@ -35,9 +34,8 @@ from linearize.reduction import DesignModel
 from linearize.visits import Visited
 from workbench.called import called, result
 
-SAMPLES, CANDIDATES = 20000, 40  # of a manoeuvre; points tried in a box
+SAMPLES, CANDIDATES = 2000, 40  # of a manoeuvre; points tried in a box
 QUANTILES = np.linspace(0.05, 0.95, 19)
-FOLLOWED_S = 0.01  # a defect is followed for so long
 LEAST = 20  # samples of a box; boxes of fewer fit one manoeuvre and no other
 
 
@@ -87,16 +85,13 @@ class _Samples:
         return (*self.model.states, *self.model.commands)
 
     def defects(self, box: Box, at: np.ndarray, of: np.ndarray) -> np.ndarray:
-        """Squares of e, summed over states: models at some samples, of others; (n_at, n_of)."""
+        """Squares of d, summed over states: models at some samples, of others; (n_at, n_of)."""
         held = {name for interval in box.values() for name in interval.holds}
         kept = [i for i, name in enumerate(self.model.states) if name not in held]
         away = self.z[of][None] - self.z[at][:, None]
         slopes, rates = self.slopes[:, kept], self.rates[:, kept]
         foretold = rates[at][:, None] + np.einsum("aij,abj->abi", slopes[at], away)
-        size = self.model.scale[kept]
-        own = self.slopes[at][:, kept][:, :, kept] * size / size[:, None]
-        missed = (foretold - rates[of]) / size
-        return ((missed @ _responses(own).transpose(0, 2, 1)) ** 2).sum(axis=2)
+        return (((foretold - rates[of]) / self.model.scale[kept]) ** 2).sum(axis=2)
 
     def inside(self, box: Box, guards: tuple[Guard, ...]) -> np.ndarray:
         """Which samples lie in a box where its guards hold, shape (n,).
@@ -171,12 +166,12 @@ class _Samples:
 
 
 def placed_modes(
-    hybrid: HybridModel, seen: Visited, number: int, keeping: tuple[str, ...] = ()
+    hybrid: HybridModel, seen: Visited, number: int, most: int = SAMPLES
 ) -> HybridModel:
     """So many modes of a plant, placed where a manoeuvre goes.
 
     ``hybrid`` tells the plant and which intervals hold states; of its other cuts only those of the
-    signals in ``keeping`` stay.  What
+    XX
     holds where the manoeuvre never goes keeps the mode, and the point, that it has there.
 
     Raises
@@ -186,7 +181,7 @@ def placed_modes(
         manoeuvre has too few samples for so many modes.
     """
     last = None
-    for last in growing_modes(hybrid, seen, keeping):
+    for last in growing_modes(hybrid, seen, most):
         if len(last.modes) >= number:
             break
     if len(last.modes) == number:
@@ -199,11 +194,11 @@ def placed_modes(
 
 
 def growing_modes(
-    hybrid: HybridModel, seen: Visited, keeping: tuple[str, ...] = ()
+    hybrid: HybridModel, seen: Visited, most: int = SAMPLES
 ) -> Iterator[HybridModel]:
     """The same, by number of modes: from the holding intervals alone on, one more each time."""
-    samples = _samples(hybrid.model, seen)
-    regions = _begin(hybrid, samples, keeping)
+    samples = _samples(hybrid.model, seen, most)
+    regions = _begin(hybrid, samples)
     modes = [samples.mode(region) for region in regions]
     splits = [samples.best_split(region) for region in regions]
     while True:
@@ -217,23 +212,13 @@ def growing_modes(
         splits[k : k + 1] = [samples.best_split(half) for half in halves]
 
 
-def _responses(A: np.ndarray) -> np.ndarray:
-    """Integral of exp(A t) over the time that a defect is followed, shape (n_at, n, n)."""
-    n = A.shape[-1]
-    block = np.zeros((len(A), 2 * n, 2 * n))
-    block[:, :n, :n], block[:, :n, n:] = A, np.eye(n)
-    return expm(block * FOLLOWED_S)[:, :n, n:]
-
-
-def _begin(
-    hybrid: HybridModel, samples: _Samples, keeping: tuple[str, ...]
-) -> list[_Region]:
+def _begin(hybrid: HybridModel, samples: _Samples) -> list[_Region]:
     """The boxes of a hybrid model without the cuts that may be chosen; the first that holds counts.
 
     What stays is each signal that somewhere holds states or is switched.
     """
     every = [item for mode in hybrid.modes for item in mode.box.items()]
-    staying = {name for name, region in every if _kept(region) or name in keeping}
+    staying = {name for name, region in every if _kept(region)}
     found, begun = [], []
     left = np.ones(len(samples.z), dtype=bool)
     for mode in hybrid.modes:
@@ -256,8 +241,8 @@ def _kept(region: Region) -> bool:
     return bool(region.holds) or isinstance(region, Level)
 
 
-def _samples(model: DesignModel, seen: Visited) -> _Samples:
-    every = slice(None, None, max(seen.rows.shape[1] // SAMPLES, 1))
+def _samples(model: DesignModel, seen: Visited, most: int) -> _Samples:
+    every = slice(None, None, max(seen.rows.shape[1] // most, 1))
     rows, touching = seen.rows[:, every], seen.touching[seen.free][every]
     n, count = len(model.states), rows.shape[1]
     rates = result(model.f.map(count), rows[:n], rows[n:])

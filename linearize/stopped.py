@@ -59,3 +59,9 @@ def guarded(hybrid: HybridModel, travel: Travel, mode: Mode) -> Mode:
     pulled[travel.velocity] = -away * strongest / travel.resting
     guards = (Guard({travel.velocity: -away}, travel.resting), Guard(pulled, -float(row[-1])))
     return replace(mode, guards=guards)
+
+
+def has_stops(hybrid: HybridModel) -> bool:
+    """True where some mode holds what rests against an end stop."""
+    labels = (region.label for mode in hybrid.modes for region in mode.box.values())
+    return any(label.endswith((LOWER, UPPER)) for label in labels)

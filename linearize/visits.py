@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import casadi as ca
@@ -112,6 +113,19 @@ def recorded_visits(
     )
     plant = plant_for(rig, finer).lean()
     return visited(model, plant, run(rig, finer), at_stops)
+
+
+def joined(parts: Sequence[Visited]) -> Visited:
+    """Several manoeuvres of one sample time, one after the other, with a gap between them."""
+    first, offsets = parts[0], np.cumsum([0, *(part.states.shape[1] for part in parts)])
+    starts = (
+        offset + k for part, offset in zip(parts, offsets, strict=False) for k in part.starts
+    )
+    rows = {
+        name: np.concatenate([getattr(part, name) for part in parts], axis=-1)
+        for name in ("states", "commands", "touching", "free")
+    }
+    return replace(first, **rows, starts=tuple(map(int, starts)))
 
 
 def _commands(model: DesignModel, plant: Plant) -> ca.Function:
