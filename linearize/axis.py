@@ -99,7 +99,9 @@ class Axis(Travel):
         found = self.steady(model, points)
         if lies_in(model, box, found):
             return found
-        at = dict(zip((*model.states, *model.commands), (*found.state, *found.command), strict=True))
+        at = dict(
+            zip((*model.states, *model.commands), (*found.state, *found.command), strict=True)
+        )
         return operating_point(model, at | points)
 
     def steady(self, model: DesignModel, points: Mapping[str, float]) -> OperatingPoint:

@@ -37,8 +37,9 @@ def operating_point(
 ) -> OperatingPoint:
     """The point with the given values, and with the free ones such that the named rates vanish.
 
-    Damped Newton in scaled variables, at most so many steps.  Names are states and commands; what is neither given nor
-    free keeps its initial or nominal value, and is where the search for a free one starts.
+    Damped Newton in scaled variables, at most so many steps.  Names are states and commands; what
+    is neither given nor free keeps its initial or nominal value, and is where the search for a free
+    one starts.
 
     Raises
     ------

@@ -1,8 +1,8 @@
 """Modes of a leg: by the region of every joint, and by how each of them slides or sticks.
 
 The valves are not cut: at a point each joint slides steadily or rests, and needs no friction for
-that.  A joint that sticks takes up what the others do to it, so each mode is that of the leg with its
-sticking joints held; see :func:`linearize.coupling.with_reactions`.
+that.  A joint that sticks takes up what the others do to it, so each mode is that of the leg with
+its sticking joints held; see :func:`linearize.coupling.with_reactions`.
 
 Source: physics.md 2.3 and 4.3.
 """

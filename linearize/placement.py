@@ -193,9 +193,7 @@ def placed_modes(
     raise ValueError(f"{hybrid.model.plant.name}: {number} modes asked for, expected {bound}")
 
 
-def growing_modes(
-    hybrid: HybridModel, seen: Visited, most: int = SAMPLES
-) -> Iterator[HybridModel]:
+def growing_modes(hybrid: HybridModel, seen: Visited, most: int = SAMPLES) -> Iterator[HybridModel]:
     """The same, by number of modes: from the holding intervals alone on, one more each time."""
     samples = _samples(hybrid.model, seen, most)
     regions = _begin(hybrid, samples)

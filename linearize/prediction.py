@@ -86,7 +86,7 @@ def _over_the_horizon(step: np.ndarray, x: np.ndarray, inputs: np.ndarray) -> np
 
     ``x`` has shape (n, n_samples + 1, n_w); ``inputs`` u and 1, shape (n_z - n, n_samples, n_w).
     """
-    (n, _, n_w), samples = x.shape, inputs.shape[1]
+    n, _, n_w = x.shape
     run, slopes = (f.map(n_w) for f in _runs(n, *inputs.shape[:2]))
     given = inputs.transpose(0, 2, 1).reshape(len(inputs), -1)
     true = x[:, FITTED::FITTED].transpose(0, 2, 1).reshape(n, -1)

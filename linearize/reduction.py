@@ -23,12 +23,13 @@ from workbench.effects.solenoid_valve import SolenoidValve
 from workbench.effects.supply_droop import SupplyDroop
 from workbench.effects.valve_command import CommandDelay, DeadZone, ValveLag, ValveOffset
 from workbench.effects.valve_hysteresis import ValveHysteresis
+from workbench.effects.wall_heat import HeatedWall
 from workbench.floating_piston import ControlChamber
 from workbench.plant import Plant
 
 FLOW_KG_S = 1e-2  # typical size of a flow that is a command
 # Effects whose states a design does without.
-INSIDE = (BristleFriction, SensorLag, SupplyDroop, ValveHysteresis, ValveLag)
+INSIDE = (BristleFriction, HeatedWall, SensorLag, SupplyDroop, ValveHysteresis, ValveLag)
 
 
 @dataclass(frozen=True)
@@ -255,6 +256,8 @@ def _left_out(plant: Plant) -> Iterator[LeftOut]:
             yield LeftOut(
                 member.name, "no lag", "inside the dead zone's undoing; margins must hold it"
             )
+        elif isinstance(member, HeatedWall):
+            yield LeftOut(f"{member.name} warmth", "wall as it was", "minutes beside the gas")
         elif isinstance(member, ValveHysteresis):
             yield LeftOut(member.name, "no play", "a play has no linear model")
         elif isinstance(member, SensorLag):

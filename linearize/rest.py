@@ -28,9 +28,9 @@ class Rest:
 def rest_of(hybrid: HybridModel, mode: Mode) -> Rest | None:
     """The equilibrium under a mode's own command, or none where its region has none.
 
-    A rest that static friction does not carry is none.  The search is :func:`linearize.equilibrium.operating_point` from the mode's point on, in all
-    states that the mode keeps.  A position whose rate is a velocity that is not held may go on: a
-    steady slide.
+    A rest that static friction does not carry is none.  The search is that of
+    :func:`linearize.equilibrium.operating_point`, from the mode's point on, in all states that the
+    mode keeps.  A position whose rate is a velocity that is not held may go on: a steady slide.
     """
     held = [name for region in mode.box.values() for name in region.holds]
     model, point = hybrid.model.holding(held), whole_point(hybrid, mode)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from linearize.axes import DRIVE, drive_axis, joint_axes, rig_axis, stroke_m
-from linearize.cylinder_modes import place_modes, regime_modes
+from linearize.axes import DRIVE, drive_axis, joint_axes, rig_axis
+from linearize.cylinder_modes import place_modes
+from linearize.cylinder_modes import regime_modes as modes_by_regime
 from linearize.equilibrium import OperatingPoint
 from linearize.leg_modes import leg_modes
 from linearize.modes import HybridModel, Interval, hybrid_modes
@@ -45,11 +46,11 @@ def _servo_drive(plant: Plant) -> HybridModel:
 
 
 def _servo_drive_regimes(plant: Plant) -> HybridModel:
-    return regime_modes(plant, drive_axis(plant), design_model(plant))
+    return modes_by_regime(plant, drive_axis(plant), design_model(plant))
 
 
 def _crr_rig(plant: Plant) -> HybridModel:
-    return regime_modes(plant, rig_axis(plant), design_model(plant))
+    return modes_by_regime(plant, rig_axis(plant), design_model(plant))
 
 
 def _crr_arm(plant: Plant) -> HybridModel:
@@ -97,6 +98,17 @@ def standard_modes(plant: Plant) -> HybridModel:
         If its kind has none.
     """
     return _among(STANDARD_MODES, plant, "no standard modes for")
+
+
+def regime_modes(plant: Plant) -> HybridModel:
+    """Valve x flow regimes x friction x {free, stops}: more modes than the standard ones.
+
+    Raises
+    ------
+    UnknownNameError
+        If its kind has none.
+    """
+    return _among(REGIME_MODES, plant, "no modes by flow regimes for")
 
 
 def slide_modes(plant: Plant) -> HybridModel:

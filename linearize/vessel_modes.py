@@ -9,9 +9,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf
 
+import numpy as np
+
 from linearize.axes import DRIVE
 from linearize.cuts import Interval, Region
-from linearize.modes import HybridModel, at_points, hybrid_modes
+from linearize.equilibrium import OperatingPoint, operating_point
+from linearize.modes import Box, HybridModel, hybrid_modes
 from linearize.reduction import DesignModel, LeftOut, closed_command, design_model
 from linearize.regimes import flow_regimes
 from workbench.plant import Plant
@@ -47,6 +50,15 @@ class Filling:
         shut = (Interval("shut", low, high, self.centre),) if self.shut else ()
         return vent, *shut, fill
 
+    def point(self, model: DesignModel, box: Box) -> OperatingPoint:
+        """The middle of a flow regime; between the ends where there is none; at rest when shut."""
+        points = {name: region.point for name, region in box.items()}
+        if self.shut and points[self.command] == self.centre:
+            return operating_point(model, points, (self.pressure,), (self.pressure,))
+        ends = model.quantities("supply.pressure_pa", "atmosphere.pressure_pa")
+        middle = float(np.mean(ends(model.initial, model.plant.nominal[0]).full()))
+        return operating_point(model, {self.pressure: middle} | points)
+
 
 def bellows(plant: Plant) -> Filling:
     """The soft joint's, whose valve never shuts; the opening is *chosen*."""
@@ -56,23 +68,21 @@ def bellows(plant: Plant) -> Filling:
 
 def reservoir(plant: Plant) -> Filling:
     """The tank's on the servo drive's valve, with the openings of the drive's modes."""
-    return Filling(
-        TANK, DRIVE.command, closed_command(plant), DRIVE.opening, DRIVE.middle
-    )
+    return Filling(TANK, DRIVE.command, closed_command(plant), DRIVE.opening, DRIVE.middle)
 
 
 def filling_modes(plant: Plant, filling: Filling) -> HybridModel:
     """Vent and fill, each with choked and with subsonic flow, and shut where the valve can be.
 
-    The points lie in the middle of each regime: in between filling and venting the pressure rests
-    only where it meets the supply's or the atmosphere's.
+    The points lie in the middle of each regime: filling and venting end only where the pressure
+    meets the supply's or the atmosphere's.
     """
     model, modes = design_model(plant), []
     for valve in filling.valve_cut():
         cuts: dict[str, tuple[Region, ...]] = {filling.command: (valve,)}
         if valve.label != "shut":
             cuts |= _regimes(model, filling, {filling.command: valve.point})
-        modes += hybrid_modes(plant, cuts, at_points, model).modes
+        modes += hybrid_modes(plant, cuts, filling.point, model).modes
     return HybridModel(plant, model, tuple(modes), (BACKFLOW,))
 
 
@@ -85,4 +95,3 @@ def _regimes(
         return {}
     regimes = flow_regimes(model, filling.pressure, sent)
     return {filling.pressure: regimes} if regimes else {}
-

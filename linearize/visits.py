@@ -28,7 +28,7 @@ class Visited:
     states        shape (n_x, n)
     commands      behind the dead zone, shape (n_u, n)
     touching      where something touches an end stop, shape (n,)
-    free          what the modes are to stand for, shape (n,): all that does not touch, or everything
+    free          what the modes are to stand for, shape (n,): all that does not touch, or all
                   where modes hold what stands at a stop
     starts        first sample of each gap-free piece
     """
@@ -118,9 +118,7 @@ def recorded_visits(
 def joined(parts: Sequence[Visited]) -> Visited:
     """Several manoeuvres of one sample time, one after the other, with a gap between them."""
     first, offsets = parts[0], np.cumsum([0, *(part.states.shape[1] for part in parts)])
-    starts = (
-        offset + k for part, offset in zip(parts, offsets, strict=False) for k in part.starts
-    )
+    starts = (offset + k for part, offset in zip(parts, offsets, strict=False) for k in part.starts)
     rows = {
         name: np.concatenate([getattr(part, name) for part in parts], axis=-1)
         for name in ("states", "commands", "touching", "free")

@@ -14,18 +14,18 @@ from linearize.hybrid_simulation import sampled_hybrid
 from linearize.modes import HybridModel
 from linearize.placement import growing_modes
 from linearize.prediction import PredictionError, fitted_single, prediction_of, single_of
-from linearize.regions import Validity, validity
+from linearize.regions import validity
 from linearize.standard import POSITION, VELOCITY, standard_modes
 from linearize.visits import Windows, visited, windows
 from studies.demo import DATA
 from studies.figures.prediction import placement_figure, point_figure
-from studies.slide_modes import STEP_S, Step, map_figure, step_figure, step_of
+from studies.mode_pictures import STEP_S, Step, map_figure, step_figure, step_of
+from studies.modes_text import region_table
 from studies.study import Claim, Extent, Outcome, Study
-from studies.text import columns, number, shown
+from studies.text import columns
 from workbench.comparison.run import run as run_rig
 from workbench.reading import read_recording
 from workbench.rig import load_rig
-from workbench.units import public_name
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -74,7 +74,7 @@ def run(folder: Path, extent: Extent, say: Callable[[str], None]) -> Outcome:
         "single": {name: prediction_of(singles[name], each) for name, each in judged.items()},
         "alone": {name: _best_alone(hybrid, each) for name, each in judged.items()},
     }
-    text = f"{_error_table(errors, found)}\n\n{_region_table(regions)}"
+    text = f"{_error_table(errors, found)}\n\n{region_table(regions, 'standard mode')}"
     figures = {
         "error_by_number": _curve(errors, found, len(hybrid.modes)),
         "map_standard": map_figure(sampled_hybrid(hybrid, STEP_S)),
@@ -144,22 +144,6 @@ def _error_table(errors: Errors, found: Others) -> str:
             for label, row in rows.items()
         ],
     )
-
-
-def _region_table(regions: list[Validity]) -> str:
-    names = max((each.alone for each in regions), key=len)
-    head = ("standard mode", "error at its point", *map(public_name, names))
-    rows = [
-        (
-            each.name,
-            number(each.at_point, 2),
-            *(shown(each.together[n], n, 2) if n in each.together else "held" for n in names),
-        )
-        for each in regions
-    ]
-    limit = f"{regions[0].tolerance:g} of any scale over {regions[0].horizon_s:g} s"
-    told = f"half-widths of boxes in which a mode errs less than {limit}"
-    return f"{told}\n{columns(head, rows)}"
 
 
 STUDY = Study(

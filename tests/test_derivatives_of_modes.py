@@ -14,7 +14,6 @@ from linearize.modes import hybrid_modes, placed_at
 from linearize.shift_modes import DIRECTIONS, ShiftPoints, gearbox_modes, side_cut, switched_modes
 from linearize.shifting import DETENT, FLOWS, HEAT, shift_model
 from linearize.standard import (
-    COMMAND,
     REGIME_MODES,
     STANDARD_MODES,
     servo_drive_cuts,
