@@ -200,9 +200,13 @@ def closed_command(plant: Plant, name: str | None = None) -> float:
     """
     signal = next(s for s in plant.commands if name in (None, s.name))
     valve = next((e for e in plant.effects if e.name == signal.name.partition(".")[0]), None)
-    offsets = (e for e in plant.effects if isinstance(e, ValveOffset) and e.signal == signal.name)
-    centre = float(getattr(valve, "centre_v", signal.nominal))
-    return centre + sum(float(effect.offset_v) for effect in offsets)
+    return float(getattr(valve, "centre_v", signal.nominal)) + offset(plant, signal.name)
+
+
+def offset(plant: Plant, name: str) -> float:
+    """By how much a command's valve stands off its centre."""
+    offsets = (e for e in plant.effects if isinstance(e, ValveOffset) and e.signal == name)
+    return sum(float(effect.offset_v) for effect in offsets)
 
 
 def _passed_over(plant: Plant, state: str) -> bool:

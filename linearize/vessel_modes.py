@@ -83,7 +83,8 @@ def filling_modes(plant: Plant, filling: Filling) -> HybridModel:
         if valve.label != "shut":
             cuts |= _regimes(model, filling, {filling.command: valve.point})
         modes += hybrid_modes(plant, cuts, filling.point, model).modes
-    return HybridModel(plant, model, tuple(modes), (BACKFLOW,))
+    regimes = any(filling.pressure in mode.box for mode in modes)
+    return HybridModel(plant, model, tuple(modes), (BACKFLOW,) if regimes else ())
 
 
 def _regimes(

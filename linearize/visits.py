@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import casadi as ca
 import numpy as np
 
-from linearize.reduction import DesignModel
+from linearize.reduction import DesignModel, offset
 from workbench.called import result
 from workbench.comparison.run import plant_for, run
 from workbench.effects.forces import EndStops
@@ -16,6 +16,7 @@ from workbench.effects.solenoid_valve import SolenoidValve
 from workbench.plant import Plant
 from workbench.recording import Recording
 from workbench.rig import Rig
+from workbench.simulation import inputs
 
 HORIZON_S = 0.05
 APART_S = 0.02  # between the starts of windows
@@ -73,12 +74,9 @@ def visited(
         If a state or a command of the plant is not among the channels.
     """
     full = plant.model
-    x, u, d = (
-        simulated.rows(names) for names in (full.states, full.commands, full.measured_inputs)
-    )
-    n = len(simulated)
+    x, (u, d), n = simulated.rows(full.states), inputs(plant, simulated), len(simulated)
     p = np.tile(plant.nominal[2][:, None], n)
-    behind = result(_commands(model, plant).map(n), x, u, np.reshape(d, (-1, n)), p)
+    behind = result(_commands(model, plant).map(n), x, u, d, p)
     flows = [name.endswith(".flow_kg_s") for name in model.commands]
     behind[flows, :-1] = 0.5 * (behind[flows, 1:] + behind[flows, :-1])
     touching = _at_stops(model, plant, simulated)
@@ -127,14 +125,17 @@ def joined(parts: Sequence[Visited]) -> Visited:
 
 
 def _commands(model: DesignModel, plant: Plant) -> ca.Function:
-    """(x, u, d, p) of the plant -> commands of the design model, shape (n_u, 1)."""
+    """(x, u, d, p) of the plant -> commands of the design model, shape (n_u, 1).
+
+    The offset of a valve is part of the design model, so it is added again.
+    """
     now, read = plant.model.conditions, []
     valves = {f"{e.name}.flow_kg_s": e for e in plant.effects if isinstance(e, SolenoidValve)}
     for name in model.commands:
         if name in valves:
             read.append(plant.model.flows[valves[name].name, "MassFlow", valves[name].chamber])
         else:
-            read.append(now.read(name))
+            read.append(now.read(name) + offset(model.plant, name))
     return ca.Function("commands", [*plant.model.symbols], [ca.vertcat(*read)])
 
 
