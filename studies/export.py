@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -28,12 +29,13 @@ def export_modes(
 
     The MAT file holds a struct array with A, B, C, D, point and drift; the NumPy file the same
     arrays as ``A_0``, ``A_1`` and so on, and the names as ``name``, ``state_names_0``, ...  The
-    map shows where each mode is active, the step the modes beside the plant.
+    map shows where each mode is active, the step the modes beside the plant; neither of cuts that
+    do not cover them.
     """
     from linearize.hybrid_simulation import sampled_hybrid
     from studies.figures.modes import pole_figure
     from studies.mode_pictures import map_figure, step_figure, step_of
-    from studies.mode_views import view_of
+    from studies.mode_views import VIEWS, view_of
     from studies.modes_text import modes_text
 
     with whole_file(folder / "modes.mat") as unfinished:
@@ -43,9 +45,14 @@ def export_modes(
     with whole_file(folder / "modes.txt") as unfinished:
         unfinished.write_text(modes_text(hybrid, regions) + "\n", encoding="utf-8")
     save(pole_figure(hybrid), folder / "poles", command)
-    modes = sampled_hybrid(hybrid, view_of(hybrid).sample_time_s)
-    save(map_figure(modes), folder / "mode_map", command)
-    save(step_figure(step_of({"modes": hybrid})), folder / "step", command)
+    if hybrid.plant.name not in VIEWS:
+        return
+    try:
+        modes = sampled_hybrid(hybrid, view_of(hybrid).sample_time_s)
+        save(map_figure(modes), folder / "mode_map", command)
+        save(step_figure(step_of({"modes": hybrid})), folder / "step", command)
+    except LookupError as error:
+        warnings.warn(f"no map and no step: {error.args[0]}", stacklevel=2)
 
 
 def _write_npz(hybrid: HybridModel, path: Path) -> None:

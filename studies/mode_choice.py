@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 from linearize.listing import trial_of
 from linearize.modes import HybridModel
@@ -12,6 +13,7 @@ from linearize.shift_modes import driving_modes
 from linearize.standard import regime_modes, standard_modes
 from linearize.stopped import has_stops
 from linearize.visits import joined, recorded_visits
+from studies.cuts_file import modes_by_cuts
 from workbench.errors import InputError, Message
 from workbench.recording import Recording
 from workbench.rig import Rig
@@ -27,8 +29,11 @@ def chosen_modes(
     placed_on: Sequence[Recording] = (),
     number: int | None = None,
     regimes: bool = False,
+    cuts: Path | None = None,
 ) -> HybridModel:
-    """The modes of a rig's plant; ``number`` of them placed where the recordings go, if any.
+    """The modes of a rig's plant: standard, by regimes, by the cuts of a file, or placed.
+
+    ``number`` of them are placed where the recordings go, as many as there are without it.
 
     Raises
     ------
@@ -37,10 +42,14 @@ def chosen_modes(
     ValueError
         If the recordings do not carry so many modes.
     """
-    if placed_on and regimes:
-        raise InputError(Message("chooses its regions itself", "--place", "no --regimes with it"))
+    asked = {"--place": placed_on, "--regimes": regimes, "--cuts": cuts}
+    given = [name for name, value in asked.items() if value]
+    if len(given) > 1:
+        raise InputError(Message("each choose the regions", " and ".join(given), "one of them"))
     if number is not None and not placed_on:
         raise InputError(Message("needs a recording to place modes on", "--number", "--place REC"))
+    if cuts:
+        return modes_by_cuts(rig.plant, cuts)
     if not placed_on:
         return (regime_modes if regimes else standard_modes)(rig.plant)
     name = rig.plant.name

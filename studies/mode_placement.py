@@ -1,4 +1,4 @@
-"""Study ``mode-placement``: how few modes predict a drive, and where their points should lie.
+"""Study ``mode-placement``: how few modes predict a plant, and where their points should lie.
 
 The modes are placed on one recording and judged on another, over 50 ms, with the plant's own
 simulation under the recorded commands as the truth.
@@ -19,6 +19,7 @@ from linearize.standard import POSITION, VELOCITY, standard_modes
 from linearize.visits import Windows, visited, windows
 from studies.demo import DATA
 from studies.figures.prediction import placement_figure, point_figure
+from studies.gearbox_driving import Driving, driven, driving_table
 from studies.mode_pictures import STEP_S, Step, map_figure, step_figure, step_of
 from studies.modes_text import region_table
 from studies.study import Claim, Extent, Outcome, Study
@@ -74,7 +75,12 @@ def run(folder: Path, extent: Extent, say: Callable[[str], None]) -> Outcome:
         "single": {name: prediction_of(singles[name], each) for name, each in judged.items()},
         "alone": {name: _best_alone(hybrid, each) for name, each in judged.items()},
     }
-    text = f"{_error_table(errors, found)}\n\n{region_table(regions, 'standard mode')}"
+    gearbox = driven(say)
+    tables = (
+        _error_table(errors, found),
+        driving_table(gearbox),
+        region_table(regions, "standard mode"),
+    )
     figures = {
         "error_by_number": _curve(errors, found, len(hybrid.modes)),
         "map_standard": map_figure(sampled_hybrid(hybrid, STEP_S)),
@@ -86,7 +92,9 @@ def run(folder: Path, extent: Extent, say: Callable[[str], None]) -> Outcome:
         "placed": {name: {str(n): e.total for n, e in row.items()} for name, row in errors.items()},
         **{label: {name: e.total for name, e in row.items()} for label, row in found.items()},
     }
-    return Outcome(text, (*_claims(errors, found, hybrid, step),), figures, numbers)
+    numbers["gearbox"] = {"placed": gearbox.placed.total, "single": gearbox.single.total}
+    claims = (*_claims(errors, found, hybrid, step), _gearbox_claim(gearbox))
+    return Outcome("\n\n".join(tables), claims, figures, numbers)
 
 
 def _error(hybrid: HybridModel, judged: Windows) -> PredictionError:
@@ -128,6 +136,13 @@ def _claims(errors: Errors, found: Others, hybrid: HybridModel, step: Step) -> I
     yield Claim(claim, f"{share:.1%}", share <= 0.05)
 
 
+def _gearbox_claim(found: Driving) -> Claim:
+    n = len(found.hybrid.modes)
+    claim = f"gearbox, {n} placed modes: at most a third of the best single model's, too"
+    told = f"{found.placed.total:.4f} of {found.single.total:.4f}, {found.share:.2f}"
+    return Claim(claim, told, found.share <= THIRD)
+
+
 def _error_table(errors: Errors, found: Others) -> str:
     head = ("modes", f"error on {PLACED_ON}", f"on {JUDGED_ON}", "over the single model's")
     single = found["single"][JUDGED_ON].total
@@ -148,7 +163,7 @@ def _error_table(errors: Errors, found: Others) -> str:
 
 STUDY = Study(
     name="mode-placement",
-    question="how few linear modes predict a servo drive over 50 ms, and where do they lie?",
+    question="how few linear modes predict a drive or a gearbox over 50 ms, and where are they?",
     source="issue of the hybrid modes; paper 003 Sec. V; physics.md 4.3",
     run=run,
 )

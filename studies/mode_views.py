@@ -40,7 +40,7 @@ class View:
 
 def view_of(hybrid: HybridModel) -> View:
     """The view of a plant."""
-    return _VIEWS[hybrid.plant.name](hybrid.plant)
+    return VIEWS[hybrid.plant.name](hybrid.plant)
 
 
 def _band(plant: Plant, command: str) -> float:
@@ -130,7 +130,7 @@ def _reservoir(plant: Plant) -> View:
     return _vessel_view(plant, reservoir(plant), 1.0, 7e5)
 
 
-_VIEWS: Mapping[str, Callable[[Plant], View]] = {
+VIEWS: Mapping[str, Callable[[Plant], View]] = {
     "servo_drive": _drive,
     "crr_rig": _rig,
     "crr_arm": _arm,

@@ -39,6 +39,9 @@ def modes(
     regimes: Annotated[
         bool, typer.Option("--regimes", help="By flow regimes and stops, where there are fewer.")
     ] = False,
+    cuts: Annotated[
+        Path | None, typer.Option("--cuts", metavar="CUTS.toml", help="Intervals of your own.")
+    ] = None,
     horizon: Annotated[
         str | None, typer.Option("--horizon", metavar="TIME", help="To predict; '50 ms'.")
     ] = None,
@@ -67,7 +70,7 @@ def modes(
         known = load_rig(rig)
         recordings = read_all(known, place, say)
         say("linearising")
-        hybrid = chosen_modes(known, recordings, number, regimes)
+        hybrid = chosen_modes(known, recordings, number, regimes, cuts)
         regions = () if no_validity else regions_of(hybrid, *limits, say)
         write_json(json, modes_document(known.name, hybrid, regions))
         if export:
