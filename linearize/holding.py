@@ -7,9 +7,9 @@ interval, downwards when it points downwards everywhere just below,
 
     min over s of f_s(x, u; s) > 0,   max over s of f_s(x, u; s) < 0,
 
-with s between the interval and the next point of a mode.  Of a slide with Stribeck friction the
-least lies at the peak of static friction.  Both are affine in (x, u), as the modes are: f_s is
-linearised where it is least.
+with s between the interval and the next point of a mode, and f_s without what is viscous.  Of a
+slide with Stribeck friction the least lies at the peak of static friction.  Both are affine in
+(x, u), as the modes are: f_s is linearised where it is least.
 """
 
 from __future__ import annotations
@@ -109,12 +109,15 @@ def least_rate(
     """The rate of a signal where it points outwards least, as a row over (x, u, 1).
 
     ``probes`` are values of the signal in ``column`` that are tried at a point (x, u), the side
-    outwards is 1 or -1.
+    outwards is 1 or -1.  What hinders in proportion to the signal, by its slope at the last probe,
+    does not count: viscous friction holds nothing.
     """
     n = len(model.states)
     around = np.tile(point[:, None], len(probes))
     around[column] = probes
     rates = result(model.f.map(len(probes)), around[:n], around[n:])[column]
+    last = model.jacobians(around[:n, -1], around[n:, -1])[0].full()[column, column]
+    rates = rates - last * (probes - probes[0])
     worst = around[:, np.argmin(side * rates)]
     A, B = (block.full()[column] for block in model.jacobians(worst[:n], worst[n:])[:2])
     row = np.concatenate([A, B])

@@ -12,7 +12,7 @@ from linearize.cuts import Interval
 from linearize.reduction import DesignModel
 
 GRID = 401
-CHOKED = 1.0 - 1e-9  # of the choked flow
+CHOKED = 1.0 - 1e-13  # of the choked flow
 HALVINGS = 40
 
 
