@@ -26,7 +26,7 @@ from workbench.recording import Recording
 from workbench.rig import default_rig
 
 SAMPLE_TIME_S = 1e-3
-MODES = 35
+MODES = 40
 PLACED_ON = ((training_command, 1), (validation_command, 2))
 JUDGED_ON = (validation_command, 3)
 APART_S = 0.05  # between the starts of windows: one fit of the single model takes minutes
