@@ -13,9 +13,10 @@ from scipy.linalg import solve_discrete_are
 from controllers.margins import Law
 from controllers.positioning import STATES, PositioningSpec
 from controllers.spec import ranged
+from linearize.axes import stroke_m
 from linearize.discrete import sampled
 from linearize.modes import Mode
-from linearize.standard import PRESSURES, SUPPLY, VELOCITY, stroke_m
+from linearize.standard import PRESSURES, SUPPLY, VELOCITY
 from workbench.plant import Plant
 
 if TYPE_CHECKING:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,6 +26,7 @@ class ModeReport:
     controllability    singular values of the scaled controllability matrix over the largest
     observability      likewise of the scaled observability matrix
     controllable, observable    ranks, with 1e-6 of the largest singular value as zero
+    seen_from      rank of observability by each output alone
     drift              largest rate at the point over the scale of its state, 1/s
     """
 
@@ -37,6 +38,7 @@ class ModeReport:
     observability: np.ndarray
     controllable: int
     observable: int
+    seen_from: Mapping[str, int]
     drift: float
 
 
@@ -59,10 +61,18 @@ def analyse(mode: Mode) -> ModeReport:
         damping=1.0 if fastest is None else float(-fastest.real / abs(fastest)),
         controllability=reach,
         observability=see,
-        controllable=int((reach > RANK_TOLERANCE).sum()),
-        observable=int((see > RANK_TOLERANCE).sum()),
+        controllable=_rank(reach),
+        observable=_rank(see),
+        seen_from={
+            name: _rank(_krylov_values(A.T, row[:, None]))
+            for name, row in zip(mode.output_names, C, strict=True)
+        },
         drift=float(np.abs(mode.drift / mode.scale).max(initial=0.0)),
     )
+
+
+def _rank(values: np.ndarray) -> int:
+    return int((values > RANK_TOLERANCE).sum())
 
 
 def analyse_all(hybrid: HybridModel) -> tuple[ModeReport, ...]:

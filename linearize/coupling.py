@@ -7,7 +7,7 @@ the rates of the one model are added up.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 import casadi as ca
@@ -81,6 +81,32 @@ def coupled_rates(model: Model, coupled: tuple[RigidCoupling, ...]) -> ca.SX:
                 mass_kg += ratio**2 * inertia
         rates[row] = force_n / mass_kg
     return rates
+
+
+def with_reactions(
+    x: ca.SX, rates: ca.SX, rows: Mapping[str, tuple[int, int]], held: tuple[str, ...]
+) -> ca.SX:
+    """The rates, shape (n_x, 1), where what is held takes up all that would move it.
+
+    With accelerations a = M^-1 tau, a held one is zero by a reaction on it, and the others feel
+    that through the inertia that they share:
+
+    a_k <- a_k - S_kh S_hh^-1 a_h,   S = da/dp,   p a pressure on each held body alone
+
+    S is M^-1 but for the area and lever of each pressure, which cancel.  ``rows`` gives the row of
+    each velocity and the column of its pressure.
+    """
+    if not held:
+        return rates
+    velocities = [row for row, _ in rows.values()]
+    fixed, pushed = (list(row) for row in zip(*(rows[name] for name in held), strict=True))
+    free = [row for row in velocities if row not in fixed]
+    slopes = ca.jacobian(rates, x)
+    reaction = ca.solve(slopes[fixed, pushed], rates[fixed])
+    found = ca.SX(rates)
+    found[free] -= slopes[free, pushed] @ reaction
+    found[fixed] = 0.0
+    return found
 
 
 def _pushed(body: str) -> Callable[[Conditions], Expression]:

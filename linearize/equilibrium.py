@@ -33,11 +33,13 @@ def operating_point(
     given: Mapping[str, float],
     free: tuple[str, ...] = (),
     vanish: tuple[str, ...] = (),
+    steps: int = STEPS,
 ) -> OperatingPoint:
     """The point with the given values, and with the free ones such that the named rates vanish.
 
-    Damped Newton in scaled variables.  Names are states and commands; what is neither given nor
-    free keeps its initial or nominal value, and is where the search for a free one starts.
+    Damped Newton in scaled variables, at most so many steps.  Names are states and commands; what
+    is neither given nor free keeps its initial or nominal value, and is where the search for a free
+    one starts.
 
     Raises
     ------
@@ -60,7 +62,7 @@ def operating_point(
         return model.f(at[:n], at[n:])[0].full().ravel() / model.scale
 
     left = residual(values)[rows]
-    for _ in range(STEPS):
+    for _ in range(steps):
         if np.abs(left).max(initial=0.0) < TOLERANCE:
             break
         A, B, _, _ = (block.full() for block in model.jacobians(values[:n], values[n:]))

@@ -7,9 +7,9 @@ interval, downwards when it points downwards everywhere just below,
 
     min over s of f_s(x, u; s) > 0,   max over s of f_s(x, u; s) < 0,
 
-with s between the interval and the next point of a mode.  Of a slide with Stribeck friction the
-least lies at the peak of static friction.  Both are affine in (x, u), as the modes are: f_s is
-linearised where it is least.
+with s between the interval and the next point of a mode, and f_s without what is viscous.  Of a
+slide with Stribeck friction the least lies at the peak of static friction.  Both are affine in
+(x, u), as the modes are: f_s is linearised where it is least.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ import numpy as np
 
 from linearize.cuts import Interval
 from linearize.modes import HybridModel, Mode
+from linearize.reduction import DesignModel
 from workbench.called import result
 
 PROBES = 40
@@ -51,13 +52,13 @@ class Hold:
         return np.where(up > 0.0, 1, np.where(down < 0.0, -1, 0))
 
 
-def hold_of(hybrid: HybridModel, mode: Mode) -> Hold | None:
-    """How a mode is left that holds a velocity; none where guards of its own say so."""
+def holds_of(hybrid: HybridModel, mode: Mode) -> tuple[Hold, ...]:
+    """How a mode is left that holds velocities; none where guards of its own say so."""
+    if mode.guards:
+        return ()
     resting = resting_states(hybrid, mode)
-    for signal, region in mode.box.items():
-        if isinstance(region, Interval) and not mode.guards and signal in resting:
-            return _hold(hybrid, mode, signal, region)
-    return None
+    cut = {s: r for s, r in mode.box.items() if s in resting and isinstance(r, Interval)}
+    return tuple(_hold(hybrid, mode, signal, region) for signal, region in cut.items())
 
 
 def resting_states(hybrid: HybridModel, mode: Mode) -> tuple[str, ...]:
@@ -83,11 +84,12 @@ def whole_point(hybrid: HybridModel, mode: Mode) -> np.ndarray:
 
 
 def _hold(hybrid: HybridModel, mode: Mode, signal: str, interval: Interval) -> Hold:
-    column = hybrid.model.states.index(signal)
-    point = whole_point(hybrid, mode)
+    others = [name for r in mode.box.values() if r is not interval for name in r.holds]
+    model, point = hybrid.model.holding(others), whole_point(hybrid, mode)
+    column = model.states.index(signal)
     below, above = float(np.nextafter(interval.lower, -np.inf)), interval.upper
     rates = [
-        _least_rate(hybrid, point, column, _probes(hybrid, signal, edge, side), side)
+        least_rate(model, point, column, _probes(hybrid, signal, edge, side), side)
         for edge, side in ((above, 1), (below, -1))
     ]
     return Hold(column, below, above, interval.point, np.array(rates))
@@ -101,14 +103,21 @@ def _probes(hybrid: HybridModel, signal: str, edge: float, side: int) -> np.ndar
     return edge + (end - edge) * np.linspace(0.0, 1.0, PROBES) ** 2
 
 
-def _least_rate(
-    hybrid: HybridModel, point: np.ndarray, column: int, probes: np.ndarray, side: int
+def least_rate(
+    model: DesignModel, point: np.ndarray, column: int, probes: np.ndarray, side: int
 ) -> np.ndarray:
-    """The rate of a signal where it points outwards least, as a row over (x, u, 1)."""
-    model, n = hybrid.model, len(hybrid.model.states)
+    """The rate of a signal where it points outwards least, as a row over (x, u, 1).
+
+    ``probes`` are values of the signal in ``column`` that are tried at a point (x, u), the side
+    outwards is 1 or -1.  What hinders in proportion to the signal, by its slope at the last probe,
+    does not count: viscous friction holds nothing.
+    """
+    n = len(model.states)
     around = np.tile(point[:, None], len(probes))
     around[column] = probes
     rates = result(model.f.map(len(probes)), around[:n], around[n:])[column]
+    last = model.jacobians(around[:n, -1], around[n:, -1])[0].full()[column, column]
+    rates = rates - last * (probes - probes[0])
     worst = around[:, np.argmin(side * rates)]
     A, B = (block.full()[column] for block in model.jacobians(worst[:n], worst[n:])[:2])
     row = np.concatenate([A, B])

@@ -20,7 +20,7 @@ import numpy as np
 
 from linearize.cuts import SAME_LEVEL, Level, Region
 from linearize.discrete import sampled
-from linearize.holding import Hold, hold_of, resting_states
+from linearize.holding import Hold, holds_of, resting_states
 from linearize.modes import HybridModel, Mode
 from workbench.plant import require
 
@@ -45,7 +45,7 @@ class SampledHybrid:
     lower, upper   ends of the boxes, shape (n_modes, n_signals)
     columns        place of each cut signal in z, shape (n_signals,)
     guards         rows over z that must not be negative, shape (n_modes, n_guards, n_z)
-    holds          the modes that hold a velocity, by index
+    holds          what each mode holds, by index; only the modes that hold a velocity
     """
 
     hybrid: HybridModel
@@ -55,7 +55,7 @@ class SampledHybrid:
     upper: np.ndarray
     columns: np.ndarray
     guards: np.ndarray
-    holds: Mapping[int, Hold]
+    holds: Mapping[int, tuple[Hold, ...]]
 
     def run(self, start: np.ndarray, commands: np.ndarray) -> HybridRun:
         """From ``start``, (n_x,) or (n_x, n_w), under ``commands``, (n_u, n) or (n_u, n, n_w).
@@ -86,13 +86,18 @@ class SampledHybrid:
         """
         signals = z[:, self.columns]
         found = self._boxed(z, signals)
-        for k, hold in self.holds.items():
+        for k, holds in self.holds.items():
             here = np.flatnonzero(found == k)
-            side = hold.side(z[here])
-            free = here[side != 0]
-            column = np.flatnonzero(self.columns == hold.column)
-            signals[free, column] = np.where(side[side != 0] > 0, hold.above, hold.below)
-            found[free] = self._boxed(z[free], signals[free])
+            gone = np.zeros(len(here), dtype=bool)
+            for hold in holds:
+                side = hold.side(z[here])
+                column = np.flatnonzero(self.columns == hold.column)
+                outside = np.where(side > 0, hold.above, hold.below)[side != 0]
+                signals[here[side != 0], column] = outside
+                gone |= side != 0
+            if gone.any():
+                free = here[gone]
+                found[free] = self._boxed(z[free], signals[free])
         return found
 
     def _boxed(self, z: np.ndarray, signals: np.ndarray) -> np.ndarray:
@@ -109,7 +114,8 @@ class SampledHybrid:
 
     def _stopped(self, x: np.ndarray, later: np.ndarray) -> np.ndarray:
         """Later states, inside of a holding interval where a step would jump across it."""
-        for column, below, above, inside in {hold.interval for hold in self.holds.values()}:
+        intervals = {hold.interval for holds in self.holds.values() for hold in holds}
+        for column, below, above, inside in intervals:
             fell = (x[:, column] >= above) & (later[:, column] <= below)
             rose = (x[:, column] <= below) & (later[:, column] >= above)
             later[fell | rose, column] = inside
@@ -130,7 +136,7 @@ def sampled_hybrid(hybrid: HybridModel, sample_time_s: float) -> SampledHybrid:
     require((*signals, *guarded), names, hybrid.model.plant.name)
     boxes = np.array([[ends(mode.box.get(name)) for name in signals] for mode in hybrid.modes])
     boxes = boxes.reshape(len(hybrid.modes), len(signals), 2)
-    holds = ((k, hold_of(hybrid, mode)) for k, mode in enumerate(hybrid.modes))
+    holds = ((k, holds_of(hybrid, mode)) for k, mode in enumerate(hybrid.modes))
     return SampledHybrid(
         hybrid=hybrid,
         sample_time_s=sample_time_s,
@@ -139,7 +145,7 @@ def sampled_hybrid(hybrid: HybridModel, sample_time_s: float) -> SampledHybrid:
         upper=boxes[:, :, 1],
         columns=np.array([names.index(name) for name in signals], dtype=int),
         guards=_guards(hybrid.modes, names),
-        holds={k: hold for k, hold in holds if hold},
+        holds={k: held for k, held in holds if held},
     )
 
 

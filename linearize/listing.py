@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from math import isfinite
 from typing import Any
@@ -11,6 +12,9 @@ import numpy as np
 from linearize.analysis import ModeReport, analyse, analyse_all, prediction_error
 from linearize.cuts import Level, Region
 from linearize.modes import HybridModel, Mode
+from linearize.reduction import LeftOut
+from linearize.regions import Validity
+from linearize.rest import Rest, rest_of
 
 
 @dataclass(frozen=True)
@@ -22,32 +26,56 @@ class Trial:
     sample_time_s: float
 
 
-TRIALS = {"_v": Trial(0.02, 0.1, 1e-3), "_kg_s": Trial(1e-4, 2e-3, 1e-4)}  # by unit of the command
+TRIALS = {  # by unit of the command
+    "_v": Trial(0.02, 0.1, 1e-3),
+    "_kg_s": Trial(1e-4, 2e-3, 1e-4),
+    "pwm": Trial(0.002, 0.1, 1e-3),
+}
 UNDRIVEN = Trial(0.0, 2e-3, 1e-4)  # a switched valve, and no command
 
 
 def table(hybrid: HybridModel) -> str:
-    """One line per mode: command, poles, swing, ranks, drift, and error against the plant."""
+    """One line per mode: command, poles, swing, ranks, drift, rest, and error against the plant.
+
+    Behind each rank stands the least singular value over the largest.  ``drift`` is the largest
+    rate at the point over its state's scale, ``rest`` how far off the point the plant can rest in
+    the region, in scales.
+    """
     wide = max(28, *(len(mode.name) + 1 for mode in hybrid.modes))
     head = (
-        f"{'mode':<{wide}}{'command':>9}{'Hz':>7}{'damping':>9}{'contr':>7}{'obs':>5}"
-        f"{'drift 1/s':>11}{'error %':>9}  poles 1/s"
+        f"{'mode':<{wide}}{'command':>9}{'Hz':>7}{'damping':>9}{'controllable':>15}"
+        f"{'observable':>15}{'drift 1/s':>11}{'rest':>7}{'error %':>9}  poles 1/s"
     )
     lines = [head]
     for mode, report in zip(hybrid.modes, analyse_all(hybrid), strict=True):
         poles = "  ".join(map(_pole, _upper(report.poles)))
-        n = len(mode.state_names)
+        reach = _ranked(report.controllable, report.controllability)
+        see = _ranked(report.observable, report.observability)
+        found = rest_of(hybrid, mode)
+        rest = "none" if found is None else f"{found.away:.2f}" if found.away > 1e-6 else "here"
         lines.append(
             f"{mode.name:<{wide}}{_first(mode.command):>9}{report.frequency_hz:>7.2f}"
-            f"{report.damping:>9.2f}{f'{report.controllable}/{n}':>7}{f'{report.observable}/{n}':>5}"
-            f"{report.drift:>11.2f}{100.0 * error_share(hybrid, mode):>9.2f}  {poles}"
+            f"{report.damping:>9.2f}{reach:>15}{see:>15}{report.drift:>11.2f}{rest:>7}"
+            f"{100.0 * error_share(hybrid, mode):>9.2f}  {poles}"
         )
     return "\n".join(lines)
 
 
+def _ranked(rank: int, values: np.ndarray) -> str:
+    return f"{rank}/{len(values)} {values.min(initial=1.0):8.1e}"
+
+
 def left_out(hybrid: HybridModel) -> str:
     """What the design model does without, one line each."""
-    items = hybrid.model.left_out
+    return _told(hybrid.model.left_out)
+
+
+def no_modes(hybrid: HybridModel) -> str:
+    """Which combinations of regions are no modes, one line each."""
+    return _told(hybrid.no_modes)
+
+
+def _told(items: Iterable[LeftOut]) -> str:
     return "\n".join(f"{item.what}: {item.instead} ({item.reason})" for item in items)
 
 
@@ -73,8 +101,9 @@ def trial_of(mode: Mode) -> Trial:
     return TRIALS.get(next(units, ""), UNDRIVEN)
 
 
-def document(hybrid: HybridModel) -> list[dict[str, Any]]:
-    """Every mode as plain lists and numbers, for JSON."""
+def document(hybrid: HybridModel, regions: Iterable[Validity] = ()) -> list[dict[str, Any]]:
+    """Every mode as plain lists and numbers, for JSON; with its region where that is known."""
+    known = {each.name: each for each in regions}
     return [
         {
             "name": mode.name,
@@ -87,10 +116,21 @@ def document(hybrid: HybridModel) -> list[dict[str, Any]]:
             **{key: getattr(mode, key).tolist() for key in ("state", "command", "output", "drift")},
             "scale": mode.scale.tolist(),
             **_reported(analyse(mode)),
+            "rest": _rested(rest_of(hybrid, mode)),
             "error_share": error_share(hybrid, mode),
+            "validity": _valid(known.get(mode.name)),
         }
         for mode in hybrid.modes
     ]
+
+
+def _rested(rest: Rest | None) -> dict[str, Any] | None:
+    """State of the design model at rest and how far off the point; none where there is no rest."""
+    return None if rest is None else {"state": rest.state.tolist(), "away": rest.away}
+
+
+def _valid(found: Validity | None) -> dict[str, Any] | None:
+    return None if found is None else {k: v for k, v in vars(found).items() if k != "name"}
 
 
 def _region(region: Region) -> dict[str, Any]:
@@ -111,6 +151,8 @@ def _reported(report: ModeReport) -> dict[str, Any]:
         "observability": report.observability.tolist(),
         "controllable": report.controllable,
         "observable": report.observable,
+        "observable_from": {**report.seen_from},
+        "drift_per_s": report.drift,
     }
 
 

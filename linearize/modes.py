@@ -11,7 +11,7 @@ and velocity are held and leave the model.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import TYPE_CHECKING
@@ -20,7 +20,7 @@ import numpy as np
 
 from linearize.cuts import Guard, Interval, Level, Region, checked
 from linearize.equilibrium import OperatingPoint, operating_point
-from linearize.reduction import DesignModel, design_model
+from linearize.reduction import DesignModel, LeftOut, design_model
 from workbench.errors import InputError, Message
 from workbench.plant import Plant
 
@@ -116,12 +116,14 @@ class Mode:
 class HybridModel:
     """A plant as a set of modes of its design model that together cover its operating range.
 
-    Where several modes hold, the first of them is the active one.
+    Where several modes hold, the first of them is the active one.  ``no_modes`` are combinations of
+    regions that are none, with what takes their place and why.
     """
 
     plant: Plant
     model: DesignModel
     modes: tuple[Mode, ...]
+    no_modes: tuple[LeftOut, ...] = ()
 
     def __getitem__(self, name: str) -> Mode:
         for mode in self.modes:
@@ -207,15 +209,32 @@ def linearised_all(
     InputError
         If a point lies outside its box, or the plant has no finite derivative there.
     """
-    if not boxes:
-        return ()
+    made: dict[int, Mode] = {}
+    for held, places in _by_held(model, boxes).items():
+        taken = ([boxes[k] for k in places], [points[k] for k in places])
+        made |= zip(places, _linearised(model.holding(held), *taken), strict=True)
+    return tuple(made[k] for k in range(len(boxes)))
+
+
+def _by_held(model: DesignModel, boxes: Sequence[Box]) -> dict[tuple[str, ...], list[int]]:
+    """Places of the boxes by the velocities held in them that others feel; one group for most."""
+    groups: dict[tuple[str, ...], list[int]] = {}
+    for k, box in enumerate(boxes):
+        held = [name for region in box.values() for name in region.holds]
+        groups.setdefault(model.holding(held).held, []).append(k)
+    return groups
+
+
+def _linearised(
+    model: DesignModel, boxes: Sequence[Box], points: Sequence[OperatingPoint]
+) -> Iterator[Mode]:
     states = np.column_stack([point.state for point in points])
     commands = np.column_stack([point.command for point in points])
     found = [block.full() for block in (*model.jacobians(states, commands),)]
     outputs = model.f(states, commands)[1].full().T
     blocks = zip(*(np.split(block, len(boxes), axis=1) for block in found), strict=True)
-    made = (_mode(model, *each) for each in zip(boxes, points, blocks, outputs, strict=True))
-    return tuple(made)
+    for each in zip(boxes, points, blocks, outputs, strict=True):
+        yield _mode(model, *each)
 
 
 def _mode(

@@ -28,6 +28,7 @@ import numpy as np
 
 from linearize.cuts import Guard, Interval, Level, Region
 from linearize.equilibrium import OperatingPoint
+from linearize.holding import resting_states
 from linearize.modes import Box, HybridModel, Mode, linearised
 from linearize.reduction import DesignModel
 from linearize.visits import Visited
@@ -40,13 +41,19 @@ LEAST = 20  # samples of a box; boxes of fewer fit one manoeuvre and no other
 
 @dataclass(frozen=True)
 class _Region:
-    """A box with guards, its samples by number, the one where it is linearised, and sum of d^2."""
+    """A box with guards, its samples by number, the one where it is linearised, and sum of d^2.
+
+    ``resting`` are signals that are zero in it.  A box that no sample visits keeps the mode that it
+    came from.
+    """
 
     box: Box
     guards: tuple[Guard, ...]
     samples: np.ndarray
     point: int
     defect: float
+    resting: tuple[str, ...] = ()
+    given: Mode | None = None
 
 
 @dataclass(frozen=True)
@@ -64,9 +71,11 @@ class _Samples:
 
     z, rates      shapes (n, n_x + n_u) and (n, n_x)
     slopes        derivatives of the rates, shape (n, n_x, n_x + n_u)
+    touching      where something touches an end stop, shape (n,)
     """
 
     model: DesignModel
+    touching: np.ndarray
     z: np.ndarray
     rates: np.ndarray
     slopes: np.ndarray
@@ -85,8 +94,12 @@ class _Samples:
         return (((foretold - rates[of]) / self.model.scale[kept]) ** 2).sum(axis=2)
 
     def inside(self, box: Box, guards: tuple[Guard, ...]) -> np.ndarray:
-        """Which samples lie in a box where its guards hold, shape (n,)."""
-        found = np.ones(len(self.z), dtype=bool)
+        """Which samples lie in a box where its guards hold, shape (n,).
+
+        A stop is no part of a mode that holds nothing: an impact is over within a sample or two.
+        """
+        holding = any(region.holds for region in box.values())
+        found = np.full(len(self.z), True) if holding else ~self.touching
         signals = dict(zip(self.names, self.z.T, strict=True))
         for name, region in box.items():
             found &= region.contains(signals[name])
@@ -94,14 +107,14 @@ class _Samples:
             found &= guard.holds(signals)
         return found
 
-    def region(self, box: Box, guards: tuple[Guard, ...], samples: np.ndarray) -> _Region:
+    def region(
+        self, box: Box, guards: tuple[Guard, ...], samples: np.ndarray, resting: tuple[str, ...]
+    ) -> _Region:
         """A box with its samples, and the best of them to linearise at."""
-        if not len(samples):
-            told = " and ".join(f"'{region.label}' of {name}" for name, region in box.items())
-            raise ValueError(f"{self.model.plant.name}: the manoeuvre never visits {told}")
         tried = _some(samples)
         sums = self.defects(box, tried, samples).sum(axis=1)
-        return _Region(box, guards, samples, int(tried[np.argmin(sums)]), float(sums.min()))
+        best = int(tried[np.argmin(sums)])
+        return _Region(box, guards, samples, best, float(sums.min()), resting)
 
     def halves(self, region: _Region, split: _Split) -> tuple[_Region, _Region]:
         """A region cut in two."""
@@ -111,15 +124,17 @@ class _Samples:
         boxes = ({**region.box, signal: side} for side in sides)
         low = self.z[region.samples, self.names.index(signal)] < split.at
         pairs = zip(boxes, (region.samples[low], region.samples[~low]), strict=True)
-        return tuple(self.region(box, region.guards, samples) for box, samples in pairs)
+        return tuple(self.region(box, region.guards, each, region.resting) for box, each in pairs)
 
     def best_split(self, region: _Region) -> _Split:
         """The cut of a region that gains most; no gain where it cannot be cut."""
+        splits = [_Split(0.0, "", 0.0)]
+        if region.given:
+            return splits[0]
         tried = _some(region.samples)
         defects = self.defects(region.box, tried, region.samples)
-        splits = [_Split(0.0, "", 0.0)]
         for column, name in enumerate(self.names):
-            if name in region.box and _kept(region.box[name]):
+            if name in region.resting or (name in region.box and _kept(region.box[name])):
                 continue
             values = self.z[region.samples, column]
             cuts = np.unique(np.quantile(values, QUANTILES))
@@ -136,6 +151,8 @@ class _Samples:
 
     def mode(self, region: _Region) -> Mode:
         """The mode of a region; what is held is linearised at rest."""
+        if region.given:
+            return replace(region.given, box=region.box)
         z, n = self.z[region.point].copy(), len(self.model.states)
         for name, part in region.box.items():
             if _kept(part):
@@ -148,19 +165,23 @@ class _Samples:
         return replace(made, guards=region.guards)
 
 
-def placed_modes(hybrid: HybridModel, seen: Visited, number: int) -> HybridModel:
+def placed_modes(
+    hybrid: HybridModel, seen: Visited, number: int, most: int = SAMPLES
+) -> HybridModel:
     """So many modes of a plant, placed where a manoeuvre goes.
 
-    ``hybrid`` tells the plant and which intervals hold states; its other cuts do not count.
+    ``hybrid`` tells the plant and which intervals hold states; of its other cuts only those of the
+    XX
+    holds where the manoeuvre never goes keeps the mode, and the point, that it has there.
 
     Raises
     ------
     ValueError
-        If there are fewer modes than holding intervals and their neighbours need, if the manoeuvre
-        misses one of those, or if it has too few samples for so many modes.
+        If there are fewer modes than holding intervals and their neighbours need, or if the
+        manoeuvre has too few samples for so many modes.
     """
     last = None
-    for last in growing_modes(hybrid, seen):
+    for last in growing_modes(hybrid, seen, most):
         if len(last.modes) >= number:
             break
     if len(last.modes) == number:
@@ -172,9 +193,9 @@ def placed_modes(hybrid: HybridModel, seen: Visited, number: int) -> HybridModel
     raise ValueError(f"{hybrid.model.plant.name}: {number} modes asked for, expected {bound}")
 
 
-def growing_modes(hybrid: HybridModel, seen: Visited) -> Iterator[HybridModel]:
+def growing_modes(hybrid: HybridModel, seen: Visited, most: int = SAMPLES) -> Iterator[HybridModel]:
     """The same, by number of modes: from the holding intervals alone on, one more each time."""
-    samples = _samples(hybrid.model, seen)
+    samples = _samples(hybrid.model, seen, most)
     regions = _begin(hybrid, samples)
     modes = [samples.mode(region) for region in regions]
     splits = [samples.best_split(region) for region in regions]
@@ -204,8 +225,12 @@ def _begin(hybrid: HybridModel, samples: _Samples) -> list[_Region]:
             continue
         begun.append((box, mode.guards))
         inside = left & samples.inside(box, mode.guards)
-        found.append(samples.region(box, mode.guards, np.flatnonzero(inside)))
         left &= ~inside
+        if inside.any():
+            resting = resting_states(hybrid, mode)
+            found.append(samples.region(box, mode.guards, np.flatnonzero(inside), resting))
+        else:
+            found.append(_Region(box, mode.guards, np.zeros(0, int), -1, 0.0, given=mode))
     return found
 
 
@@ -214,13 +239,14 @@ def _kept(region: Region) -> bool:
     return bool(region.holds) or isinstance(region, Level)
 
 
-def _samples(model: DesignModel, seen: Visited) -> _Samples:
-    rows = seen.rows[:, :: max(seen.rows.shape[1] // SAMPLES, 1)]
+def _samples(model: DesignModel, seen: Visited, most: int) -> _Samples:
+    every = slice(None, None, max(seen.rows.shape[1] // most, 1))
+    rows, touching = seen.rows[:, every], seen.touching[seen.free][every]
     n, count = len(model.states), rows.shape[1]
     rates = result(model.f.map(count), rows[:n], rows[n:])
     A, B, _, _ = called(model.jacobians.map(count), rows[:n], rows[n:])
     slopes = [block.reshape(n, count, -1).transpose(1, 0, 2) for block in (A, B)]
-    return _Samples(model, rows.T, rates.T, np.concatenate(slopes, axis=2))
+    return _Samples(model, touching, rows.T, rates.T, np.concatenate(slopes, axis=2))
 
 
 def _some(samples: np.ndarray) -> np.ndarray:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import casadi as ca
 import numpy as np
 from scipy.optimize import least_squares
 
@@ -16,7 +17,9 @@ from linearize.holding import whole_point
 from linearize.hybrid_simulation import SampledHybrid, sampled_hybrid
 from linearize.modes import HybridModel, Mode, linearised
 from linearize.visits import Windows
+from workbench.called import result
 
+ENOUGH = 1e-5  # of the sum of squares: a step that gains less ends the fit
 FITTED = 5  # every so many samples of a window count in the fit of the single model
 
 
@@ -58,33 +61,76 @@ def single_of(hybrid: HybridModel, mode: Mode, sample_time_s: float) -> SampledH
 def fitted_single(hybrid: HybridModel, windows: Windows) -> SampledHybrid:
     """The one affine model that predicts these very windows best, physics or not.
 
-    One step ahead by linear least squares, then over the whole horizon by Gauss-Newton steps from
-    there.  It is judged on what it was fitted to, so no other single model is treated as well.
+    One step ahead by linear least squares, then over the whole horizon by damped Gauss-Newton steps
+    from there, with exact derivatives of the run over the horizon.  It is judged on what it was
+    fitted to, so no other single model is treated as well.
 
     Source: prediction error method, Ljung 1999, "System Identification", Sec. 7.
     """
     single = single_of(hybrid, hybrid.modes[0], windows.sample_time_s)
     n, m = len(windows.states), len(windows.commands)
     middle = np.concatenate([windows.states.mean(axis=(1, 2)), windows.commands.mean(axis=(1, 2))])
-    size = np.concatenate([hybrid.model.scale, np.ones(m)])
+    size = np.concatenate([hybrid.model.scale, hybrid.model.command_scale])
     x, u = (
         (v - middle[part, None, None]) / size[part, None, None]
         for v, part in ((windows.states, slice(0, n)), (windows.commands, slice(n, n + m)))
     )
-    ones = np.ones((1, *x.shape[1:]))
-    z = np.concatenate([x, u, ones])
+    z = np.concatenate([x, u, np.ones((1, *x.shape[1:]))])
     per_step = np.linalg.lstsq(z[:, :-1].reshape(n + m + 1, -1).T, x[:, 1:].reshape(n, -1).T)[0].T
+    found = _over_the_horizon(per_step, x, z[n:, :-1])
+    return replace(single, steps=_unscaled(found, middle, size))
 
-    def residual(change: np.ndarray) -> np.ndarray:
-        step, now, found = per_step + change.reshape(per_step.shape), x[:, 0], []
-        for k in range(x.shape[1] - 1):
-            now = step @ np.vstack([now, z[n:, k]])
-            found.append(now - x[:, k + 1])
-        return np.ravel(found[FITTED - 1 :: FITTED])
 
-    change = 1e-3 * np.ones(per_step.size)
-    best = least_squares(residual, np.zeros(per_step.size), x_scale=change, method="lm")
-    return replace(single, steps=_unscaled(per_step + best.x.reshape(per_step.shape), middle, size))
+def _over_the_horizon(step: np.ndarray, x: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+    """The step [F G offset], (n, n_z), from which the runs from x[:, 0] miss x least.
+
+    ``x`` has shape (n, n_samples + 1, n_w); ``inputs`` u and 1, shape (n_z - n, n_samples, n_w).
+    """
+    n, _, n_w = x.shape
+    run, slopes = (f.map(n_w) for f in _runs(n, *inputs.shape[:2]))
+    given = inputs.transpose(0, 2, 1).reshape(len(inputs), -1)
+    true = x[:, FITTED::FITTED].transpose(0, 2, 1).reshape(n, -1)
+
+    def at(values: np.ndarray) -> tuple[np.ndarray, ...]:
+        return np.tile(values.reshape(step.shape), n_w), x[:, 0], given
+
+    best = least_squares(
+        lambda values: (result(run, *at(values)) - true).ravel(),
+        step.ravel(),
+        lambda values: _rows(result(slopes, *at(values)), n),
+        method="lm",
+        ftol=ENOUGH,
+    )
+    return best.x.reshape(step.shape)
+
+
+def _runs(n: int, n_inputs: int, samples: int) -> tuple[ca.Function, ca.Function]:
+    """(step, start, inputs) -> every FITTED-th state, and its slopes by the step's entries.
+
+    The slopes S, (n, n n_z), go along with the state: S+ = F S + d(step z)/dstep.  Of both results
+    a column is a sample; one of the second holds the columns of its S.
+    """
+    step, x, u = ca.SX.sym("step", n, n + n_inputs), ca.SX.sym("x", n), ca.SX.sym("u", n_inputs)
+    S = ca.SX.sym("S", n, step.numel())
+    later = step @ ca.vertcat(x, u)
+    moved = step[:, :n] @ S + ca.jacobian(later, ca.vec(step.T))
+    once = ca.Function("once", [step, x, u, S], [later, moved])
+    shapes = {"step": step.shape, "start": x.shape, "given": (n_inputs, samples)}
+    entries, start, given = (ca.MX.sym(name, *shape) for name, shape in shapes.items())
+    now, slopes, states, rows = start, ca.MX(*S.shape), [], []
+    for k in range(samples):
+        now, slopes = once(entries, now, given[:, k], slopes)
+        states.append(now)
+        rows.append(ca.vec(slopes))
+    counted = slice(FITTED - 1, None, FITTED)
+    inputs = [entries, start, given]
+    return tuple(ca.Function("run", inputs, [ca.horzcat(*row[counted])]) for row in (states, rows))
+
+
+def _rows(slopes: np.ndarray, n: int) -> np.ndarray:
+    """Slopes as :func:`_runs` gives them, a row for each state and sample, a column each entry."""
+    by_entry = slopes.reshape(-1, n, slopes.shape[1])
+    return by_entry.transpose(1, 2, 0).reshape(n * slopes.shape[1], -1)
 
 
 def _unscaled(step: np.ndarray, middle: np.ndarray, size: np.ndarray) -> np.ndarray:

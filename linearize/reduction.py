@@ -8,14 +8,14 @@ can be printed, and undone one line at a time.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import casadi as ca
 import numpy as np
 
-from linearize.coupling import RigidCoupling, coupled_rates
+from linearize.coupling import RigidCoupling, coupled_rates, with_reactions
 from workbench.effect import Expression
 from workbench.effects.bristle_friction import BristleFriction
 from workbench.effects.sensor_response import SensorLag
@@ -23,11 +23,13 @@ from workbench.effects.solenoid_valve import SolenoidValve
 from workbench.effects.supply_droop import SupplyDroop
 from workbench.effects.valve_command import CommandDelay, DeadZone, ValveLag, ValveOffset
 from workbench.effects.valve_hysteresis import ValveHysteresis
+from workbench.effects.wall_heat import HeatedWall
 from workbench.floating_piston import ControlChamber
 from workbench.plant import Plant
 
+FLOW_KG_S = 1e-2  # typical size of a flow that is a command
 # Effects whose states a design does without.
-INSIDE = (BristleFriction, SensorLag, SupplyDroop, ValveHysteresis, ValveLag)
+INSIDE = (BristleFriction, HeatedWall, SensorLag, SupplyDroop, ValveHysteresis, ValveLag)
 
 
 @dataclass(frozen=True)
@@ -56,6 +58,10 @@ class DesignModel:
         Values that differ from the plant's, by ``part.parameter_unit``.
     couplings
         Parts that move with a body, and bring no states.
+    pushes
+        For each velocity of bodies that feel each other's inertia, a state that pushes on it alone.
+    held
+        Velocities among those that something holds at zero.
     """
 
     plant: Plant
@@ -63,6 +69,20 @@ class DesignModel:
     left_out: tuple[LeftOut, ...]
     nulls: Mapping[str, float] = field(default_factory=dict)
     couplings: tuple[RigidCoupling, ...] = ()
+    pushes: Mapping[str, str] = field(default_factory=dict)
+    held: tuple[str, ...] = ()
+
+    def holding(self, states: Iterable[str]) -> DesignModel:
+        """The same model with the velocities among these states held, where others feel that."""
+        held = tuple(name for name in states if name in self.pushes)
+        if held not in self._held:
+            self._held[held] = replace(self, held=held)
+        return self._held[held]
+
+    @cached_property
+    def _held(self) -> dict[tuple[str, ...], DesignModel]:
+        """Models that were made by :meth:`holding`, with their derivatives; at first this one."""
+        return {self.held: self}
 
     @property
     def commands(self) -> tuple[str, ...]:
@@ -77,6 +97,12 @@ class DesignModel:
         """Typical size of each state, shape (n_x,)."""
         sizes = {name: state.scale for name, state in self.plant.state_list.items()}
         return np.array([sizes[name] for name in self.states])
+
+    @cached_property
+    def command_scale(self) -> np.ndarray:
+        """Typical size of each command, shape (n_u,): a tenth of its range, of a flow 10 g/s."""
+        ranges = [signal.upper - signal.lower for signal in self.plant.commands]
+        return np.array([0.1 * wide if np.isfinite(wide) else FLOW_KG_S for wide in ranges])
 
     @cached_property
     def initial(self) -> np.ndarray:
@@ -148,8 +174,12 @@ class DesignModel:
     @cached_property
     def _expressions(self) -> tuple[ca.SX, ca.SX]:
         _, rates, outputs = self._substituted
-        rows = [self.plant.model.states.index(name) for name in self.states]
-        return rates[rows], outputs
+        own = rates[[self.plant.model.states.index(name) for name in self.states]]
+        rows = {
+            name: (self.states.index(name), self.states.index(push))
+            for name, push in self.pushes.items()
+        }
+        return with_reactions(self.symbols[0], own, rows, self.held), outputs
 
 
 def design_model(plant: Plant) -> DesignModel:
@@ -163,11 +193,20 @@ def design_model(plant: Plant) -> DesignModel:
     return DesignModel(design, kept, tuple(_left_out(lean)))
 
 
-def closed_command(plant: Plant) -> float:
-    """The first command's value that opens nothing: its nominal one and the valve's offset."""
-    signal = plant.commands[0]
-    offsets = (e for e in plant.effects if isinstance(e, ValveOffset) and e.signal == signal.name)
-    return signal.nominal + sum(float(effect.offset_v) for effect in offsets)
+def closed_command(plant: Plant, name: str | None = None) -> float:
+    """Value of a command, the first unless named, at which its valve stands at its centre.
+
+    That is the centre of the valve itself, the nominal command where it has none, and the offset.
+    """
+    signal = next(s for s in plant.commands if name in (None, s.name))
+    valve = next((e for e in plant.effects if e.name == signal.name.partition(".")[0]), None)
+    return float(getattr(valve, "centre_v", signal.nominal)) + offset(plant, signal.name)
+
+
+def offset(plant: Plant, name: str) -> float:
+    """By how much a command's valve stands off its centre."""
+    offsets = (e for e in plant.effects if isinstance(e, ValveOffset) and e.signal == name)
+    return sum(float(effect.offset_v) for effect in offsets)
 
 
 def _passed_over(plant: Plant, state: str) -> bool:
@@ -221,6 +260,8 @@ def _left_out(plant: Plant) -> Iterator[LeftOut]:
             yield LeftOut(
                 member.name, "no lag", "inside the dead zone's undoing; margins must hold it"
             )
+        elif isinstance(member, HeatedWall):
+            yield LeftOut(f"{member.name} warmth", "wall as it was", "minutes beside the gas")
         elif isinstance(member, ValveHysteresis):
             yield LeftOut(member.name, "no play", "a play has no linear model")
         elif isinstance(member, SensorLag):

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from scipy.stats import qmc
@@ -51,13 +52,17 @@ def validity(
     mode: Mode,
     horizon_s: float = HORIZON_S,
     tolerance: float = TOLERANCE,
+    sample_time_s: float = SAMPLE_TIME_S,
 ) -> Validity:
     """The region of validity of one mode; half-widths are 0 where the point itself is off."""
     names = (*mode.state_names, *mode.command_names)
-    size = np.concatenate([mode.scale, np.ones(len(mode.command_names))])
+    driven = [hybrid.model.commands.index(name) for name in mode.command_names]
+    size = np.concatenate([mode.scale, hybrid.model.command_scale[driven]])
+    samples = round(horizon_s / sample_time_s)
+    errors_of = partial(_errors, hybrid, mode, samples=samples, sample_time_s=sample_time_s)
     signed = np.concatenate([GROWTH, -GROWTH])
     axes = (signed[:, None, None] * np.diag(size)).transpose(1, 0, 2).reshape(-1, len(size))
-    errors = _errors(hybrid, mode, np.vstack([0.0 * size, axes]), horizon_s)
+    errors = errors_of(np.vstack([0.0 * size, axes]))
     at_point, moved = errors[0], errors[1:].reshape(len(size), 2, len(GROWTH)).max(axis=1)
     good = (moved <= tolerance) & (at_point <= tolerance)
     alone = size * _last(GROWTH, good)
@@ -65,7 +70,7 @@ def validity(
     corners = np.where(np.abs(cube).max(axis=1, keepdims=True) > 0.0, cube, 1.0)
     corners = corners / np.abs(corners).max(axis=1, keepdims=True)  # onto the faces of the box
     tried = (SHARES[:, None, None] * corners * alone).reshape(-1, len(size))
-    held = _errors(hybrid, mode, tried, horizon_s).reshape(len(SHARES), -1).max(axis=1)
+    held = errors_of(tried).reshape(len(SHARES), -1).max(axis=1)
     share = float(_last(SHARES, (held <= tolerance)[None])[0])
     return Validity(
         mode.name,
@@ -77,7 +82,9 @@ def validity(
     )
 
 
-def _errors(hybrid: HybridModel, mode: Mode, moved: np.ndarray, horizon_s: float) -> np.ndarray:
+def _errors(
+    hybrid: HybridModel, mode: Mode, moved: np.ndarray, *, samples: int, sample_time_s: float
+) -> np.ndarray:
     """Largest error over the horizon of starts and commands off the point by ``moved``, (n,).
 
     The plant is that of the design model with all of its states, as it is behind the dead zone.
@@ -87,14 +94,13 @@ def _errors(hybrid: HybridModel, mode: Mode, moved: np.ndarray, horizon_s: float
     z = np.tile(whole_point(hybrid, mode), (n, 1))
     z[:, [names.index(name) for name in (*mode.state_names, *mode.command_names)]] += moved
     x, u = z[:, : len(model.states)].T, z[:, len(model.states) :].T
-    samples = round(horizon_s / SAMPLE_TIME_S)
-    step, now, linear = whole_step(hybrid, mode, SAMPLE_TIME_S), x, []
+    step, now, linear = whole_step(hybrid, mode, sample_time_s), x, []
     for _ in range(samples):
         now = step @ np.vstack([now, u, np.ones((1, n))])
         linear.append(now)
     full = result(model.full_under.map(n), x, u)
     _, d, p = plant.nominal
-    run = plant.model.run(SAMPLE_TIME_S, samples).map(n)
+    run = plant.model.run(sample_time_s, samples).map(n)
     inputs = (np.repeat(u, samples, axis=1), np.tile(d[:, None], n * samples))
     later = result(run, full, *inputs, np.tile(p[:, None], n))
     rows = [plant.model.states.index(name) for name in model.states]

@@ -9,25 +9,37 @@ Source: paper 003 Sec. V; physics.md 4.2.  The operating points are chosen.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from math import inf
 
 import casadi as ca
 import numpy as np
 
+from linearize.axis import Travel
 from linearize.cuts import Guard, Interval, Level, Region
-from linearize.equilibrium import operating_point
-from linearize.modes import HybridModel, Mode, hybrid_modes, linearised, placed_at
+from linearize.equilibrium import OperatingPoint, operating_point
+from linearize.modes import (
+    Box,
+    HybridModel,
+    Mode,
+    Placing,
+    hybrid_modes,
+    linearised,
+    placed_at,
+)
 from linearize.reduction import DesignModel
 from linearize.shifting import (
     FLOWS,
+    MASSES,
     POSITION,
     PRESSURES,
     VELOCITY,
+    driving_model,
     shift_model,
     switched_shift_model,
 )
+from linearize.stopped import AT_STOPS, guarded, stop_cut
 from workbench.effects.forces import EndStops
 from workbench.effects.solenoid_valve import SolenoidValve
 from workbench.plant import Plant
@@ -35,6 +47,7 @@ from workbench.plants.gearbox import COMMANDS, MAIN
 
 NEUTRAL_M, NEUTRAL_M_S = 1e-4, 1e-2  # held where it is nearer and slower than this
 BESIDE_M = 1e-9  # to either side of Neutral
+AT_NEUTRAL = Interval("held at Neutral", -NEUTRAL_M, NEUTRAL_M, 0.0, (POSITION, VELOCITY))
 SLIDING_M_S = 0.1  # dry friction is all there: tanh(100)
 
 DIRECTIONS = {
@@ -102,11 +115,70 @@ def switched_modes(
     What the valves pass stands in A and in the drift.
     """
     points, model = points or ShiftPoints(), model or switched_shift_model(plant)
-    cuts: dict[str, tuple[Region, ...]] = {POSITION: side_cut(model, pieces)}
-    for number, command in enumerate(COMMANDS):
-        labels = (f"{number + 1} {label}" for label, _ in points.by_valve)
-        cuts[command] = tuple(map(Level, labels, (0.0, 1.0)))
+    cuts = {POSITION: side_cut(model, pieces), **valve_cut(points)}
     return hybrid_modes(plant, cuts, _placing(COMMANDS, points), model)
+
+
+def driving_modes(plant: Plant) -> HybridModel:
+    """Sides x {slide -, stick, slide +}, held at Neutral and at both ends, under mass flows.
+
+    Over 50 ms of driving the piston stands as long as it moves, by dry friction and detent, while
+    the chambers fill and empty: see :func:`linearize.shifting.driving_model`.  What
+    :func:`linearize.placement.placed_modes` begins with.
+    """
+    model, placing = driving_model(plant), _at_room_temperature(plant)
+    travel = Travel(
+        position=POSITION,
+        velocity=VELOCITY,
+        resting=NEUTRAL_M_S,
+        sliding=SLIDING_M_S,
+        ends=(-_stroke_m(model), _stroke_m(model)),
+    )
+
+    def made(cuts: Mapping[str, Iterable[Region]]) -> HybridModel:
+        return hybrid_modes(plant, cuts, placing, model)
+
+    (neutral,) = made({POSITION: (AT_NEUTRAL,)}).modes
+    neutral = replace(neutral, guards=neutral_guards(model))
+    ends = (made({POSITION: (end,)}) for end in stop_cut(travel))
+    stopped = (guarded(each, travel, mode) for each in ends for mode in each.modes)
+    free = made({POSITION: side_cut(model), VELOCITY: travel.friction_cut()}).modes
+    return HybridModel(plant, model, (neutral, *stopped, *free), AT_STOPS)
+
+
+def _at_room_temperature(plant: Plant) -> Placing:
+    """Each cut signal at its point, vented, with the gas at the temperature of the supply."""
+    thin = shift_model(plant)
+
+    def placed(model: DesignModel, box: Box) -> OperatingPoint:
+        at = {name: region.point for name, region in box.items()}
+        x = [at.get(n, v) for n, v in zip(thin.states, thin.initial, strict=True)]
+        whole = dict(zip(thin.plant.model.states, thin.full(x).full().ravel(), strict=True))
+        return operating_point(model, {name: float(whole[name]) for name in MASSES} | at)
+
+    return placed
+
+
+def valve_cut(points: ShiftPoints) -> dict[str, tuple[Level, ...]]:
+    """Each valve released and energised."""
+    labels = [label for label, _ in points.by_valve]
+    return {
+        command: tuple(map(Level, (f"{number + 1} {label}" for label in labels), (0.0, 1.0)))
+        for number, command in enumerate(COMMANDS)
+    }
+
+
+def _at_room_temperature(plant: Plant) -> Placing:
+    """Each cut signal at its point, vented, with the gas at the temperature of the supply."""
+    thin = shift_model(plant)
+
+    def placed(model: DesignModel, box: Box) -> OperatingPoint:
+        at = {name: region.point for name, region in box.items()}
+        x = [at.get(n, v) for n, v in zip(thin.states, thin.initial, strict=True)]
+        whole = dict(zip(thin.plant.model.states, thin.full(x).full().ravel(), strict=True))
+        return operating_point(model, {name: float(whole[name]) for name in MASSES} | at)
+
+    return placed
 
 
 def side_cut(model: DesignModel, pieces: int = 1) -> tuple[Interval, ...]:
@@ -115,15 +187,15 @@ def side_cut(model: DesignModel, pieces: int = 1) -> tuple[Interval, ...]:
     Of the two volumes that is the one that the side shrinks to its dead volume: 1 on the Low side,
     2 on the High one.  Each point is where that volume is the geometric mean of its piece.
     """
-    stroke_m = next(float(e.upper_m) for e in model.plant.effects if _ends(e))
+    stroke_m = _stroke_m(model)
     volume = model.quantities("chamber_1.volume_m3", "chamber_2.volume_m3")
     cut = []
     for row, (label, ends_m) in enumerate(
         {"Low side": (-stroke_m, 0.0), "High side": (0.0, stroke_m)}.items()
     ):
         places_m = np.linspace(*ends_m, 1001)
-        state = [np.full(1001, model.initial[0]), np.full(1001, model.initial[1])]
-        x = np.vstack([*state, places_m, 0.0 * places_m])
+        x = np.tile(model.initial[:, None], len(places_m))
+        x[model.states.index(POSITION)] = places_m
         sizes = np.log(volume(x, model.plant.nominal[0]).full()[row])
         steps = np.interp(np.linspace(0.0, 1.0, 2 * pieces + 1), *_rising(sizes, places_m))
         ends = (-inf, 0.0) if row == 0 else (0.0, inf)
@@ -140,11 +212,14 @@ def held_at_neutral(model: DesignModel, points: ShiftPoints | None = None) -> Mo
     Both forces are linear in the pressures; they are read off the model on either side.
     """
     half_pa = (points or ShiftPoints()).charging_pa
-    box = {POSITION: Interval("held at Neutral", -NEUTRAL_M, NEUTRAL_M, 0.0, (POSITION, VELOCITY))}
     point = operating_point(model, {**dict.fromkeys(PRESSURES, half_pa), POSITION: 0.0})
+    return replace(linearised(model, {POSITION: AT_NEUTRAL}, point), guards=neutral_guards(model))
+
+
+def neutral_guards(model: DesignModel) -> tuple[Guard, ...]:
+    """Slow, and pushed to Neutral from both sides."""
     slow = (Guard({VELOCITY: sign}, NEUTRAL_M_S) for sign in (1.0, -1.0))
-    pushed = (_push(model, sign) for sign in (-1.0, 1.0))
-    return replace(linearised(model, box, point), guards=(*slow, *pushed))
+    return (*slow, *(_push(model, sign) for sign in (-1.0, 1.0)))
 
 
 def valve_flows(plant: Plant) -> Callable[[float, float], np.ndarray]:
@@ -175,12 +250,13 @@ def _placing(inputs: tuple[str, str], points: ShiftPoints):
 
 def _push(model: DesignModel, side: float) -> Guard:
     """The force at rest on one side of Neutral, over the mass, towards it."""
-    x = np.array([0.0, 0.0, side * BESIDE_M, 0.0])
-    u = np.zeros(len(model.commands))
-    slope = model.jacobians(x, u)[0].full()[3]
-    offset = float(model.f(x, u)[0][3])
-    weights = {name: -side * float(slope[k]) for k, name in enumerate(PRESSURES)}
-    return Guard(weights, -side * offset)
+    x, u = model.initial.copy(), np.zeros(len(model.commands))
+    x[model.states.index(POSITION)], row = side * BESIDE_M, model.states.index(VELOCITY)
+    columns = [model.states.index(name) for name in PRESSURES]
+    slope = model.jacobians(x, u)[0].full()[row, columns]
+    offset = float(model.f(x, u)[0][row]) - slope @ x[columns]
+    weights = dict(zip(PRESSURES, map(float, -side * slope), strict=True))
+    return Guard(weights, -side * float(offset))
 
 
 def _rising(values: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -188,5 +264,7 @@ def _rising(values: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndar
     return (values - values[0]) / (values[-1] - values[0]), places
 
 
-def _ends(effect: object) -> bool:
-    return isinstance(effect, EndStops) and effect.body == MAIN
+def _stroke_m(model: DesignModel) -> float:
+    """From Neutral to either end."""
+    stops = (e for e in model.plant.effects if isinstance(e, EndStops) and e.body == MAIN)
+    return float(next(stops).upper_m)

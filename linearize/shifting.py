@@ -27,6 +27,7 @@ from workbench.sources import FlowSource
 POSITION, VELOCITY = f"{MAIN}.position_m", f"{MAIN}.velocity_m_s"
 PRESSURES = ("chamber_1.pressure_pa", "chamber_2.pressure_pa")
 STATES = (*PRESSURES, POSITION, VELOCITY)
+MASSES = ("chamber_1.mass_kg", "chamber_2.mass_kg")
 FLOWS = ("valve_1.flow_kg_s", "valve_2.flow_kg_s")
 
 
@@ -70,8 +71,8 @@ RIGID = (
     ),
     LeftOut("finger", "one body with the main piston", "a joint of 5e6 N/m is no part of a design"),
     LeftOut("control_chamber.pressure_pa", "ambient pressure", "its port is wide"),
-    LeftOut("mass of gas", "gas at supply temperature", "temperature moves the flow by per cents"),
 )
+GAS = LeftOut("mass of gas", "gas at supply temperature", "temperature moves the flow by per cents")
 SWITCHED = LeftOut("solenoids", "armature at the end its command drives it to", "over in 4 to 7 ms")
 REPLACED = LeftOut("solenoids", "their mass flows as commands", "the input of the paper")
 
@@ -108,11 +109,22 @@ def switched_shift_model(plant: Plant, omitted: tuple[Omission, ...] = OMITTED) 
     return _reduced(plant.lean(), SWITCHED, omitted)
 
 
+def driving_model(plant: Plant) -> DesignModel:
+    """The gearbox on (p1, p2, m1, m2, x, v), with the two mass flows as commands.
+
+    For longer than a shift: dry friction and detent hold the piston between shifts, and gas that
+    expands through a valve cools by some 80 K.
+    """
+    whole = _reduced(fed_by_flows(plant.lean()), REPLACED, ())
+    left_out = tuple(item for item in whole.left_out if item is not GAS)
+    return replace(whole, states=(*PRESSURES, *MASSES, POSITION, VELOCITY), left_out=left_out)
+
+
 def _reduced(plant: Plant, valves: LeftOut, omitted: tuple[Omission, ...]) -> DesignModel:
     return DesignModel(
         plant=plant,
         states=STATES,
-        left_out=(valves, *RIGID, *(each.left_out for each in omitted), *_slow(plant)),
+        left_out=(valves, *RIGID, GAS, *(each.left_out for each in omitted), *_slow(plant)),
         nulls=dict(pair for each in omitted for pair in each.nulls(plant)),
         couplings=tuple(couplings(plant)),
     )

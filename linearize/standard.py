@@ -3,39 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from math import inf
 
-from linearize.equilibrium import OperatingPoint, operating_point
+from linearize.axes import DRIVE, drive_axis, joint_axes, rig_axis
+from linearize.cylinder_modes import place_modes
+from linearize.cylinder_modes import regime_modes as modes_by_regime
+from linearize.equilibrium import OperatingPoint
+from linearize.leg_modes import leg_modes
 from linearize.modes import HybridModel, Interval, hybrid_modes
-from linearize.reduction import DesignModel, closed_command
+from linearize.reduction import DesignModel, design_model
 from linearize.shift_modes import gearbox_modes
-from workbench.effects.forces import EndStops
+from linearize.vessel_modes import bellows, filling_modes, reservoir
 from workbench.errors import UnknownNameError
 from workbench.plant import Plant
 
-POSITION, VELOCITY = "slide.position_m", "slide.velocity_m_s"
-PRESSURES = ("chamber_a.pressure_pa", "chamber_b.pressure_pa")
-COMMAND = "valve.command_v"
+POSITION, VELOCITY = DRIVE.position, DRIVE.velocity
+PRESSURES = DRIVE.pressures
+COMMAND = DRIVE.command
 
 SUPPLY = "supply.pressure_pa"
-
-SLIDING_M_S = 0.1  # four Stribeck velocities: dry friction is Coulomb's alone
-RESTING_M_S = 1e-3
-CLOSED_V, OPEN_V = 0.01, 0.2  # from the valve's centre, behind the dead zone
-
-
-def stroke_m(plant: Plant) -> float:
-    """Where the slide meets its far end stop.
-
-    Raises
-    ------
-    ValueError
-        If nothing ends the stroke.
-    """
-    ends = [float(e.upper_m) for e in plant.effects if isinstance(e, EndStops)]
-    if not ends:
-        raise ValueError(f"{plant.name} has no end stops; expected end_stops among its effects")
-    return ends[0]
 
 
 def servo_drive_cuts(plant: Plant) -> dict[str, tuple[Interval, ...]]:
@@ -43,56 +28,65 @@ def servo_drive_cuts(plant: Plant) -> dict[str, tuple[Interval, ...]]:
 
     Source: physics.md 4.3 (valve and friction); thirds because stiffness goes with 1 / volume.
     """
-    centre_v = closed_command(plant)
-    third_m = stroke_m(plant) / 3.0
-    low_v, high_v = centre_v - CLOSED_V, centre_v + CLOSED_V
+    axis = drive_axis(plant)
     return {
-        COMMAND: (
-            Interval("charge b", -inf, low_v, centre_v - OPEN_V),
-            Interval("closed", low_v, high_v, centre_v),
-            Interval("charge a", high_v, inf, centre_v + OPEN_V),
-        ),
-        VELOCITY: (
-            Interval("slide -", -inf, -RESTING_M_S, -SLIDING_M_S),
-            Interval("stick", -RESTING_M_S, RESTING_M_S, 0.0, holds=(POSITION, VELOCITY)),
-            Interval("slide +", RESTING_M_S, inf, SLIDING_M_S),
-        ),
-        POSITION: (
-            Interval("near a", -inf, third_m, 0.5 * third_m),
-            Interval("middle", third_m, 2.0 * third_m, 1.5 * third_m),
-            Interval("near b", 2.0 * third_m, inf, 2.5 * third_m),
-        ),
+        COMMAND: axis.valve_cut(),
+        VELOCITY: axis.friction_cut(),
+        POSITION: axis.place_cut(),
     }
 
 
 def servo_drive_point(model: DesignModel, box: Mapping[str, Interval]) -> OperatingPoint:
-    """Steady sliding in the direction of the box; at rest the pressures of the closed valve.
-
-    Where the valve drives against the motion there is no steady state: the pressures are those of
-    the steady slide, the command is the interval's, and the drift says how fast it brakes.
-    """
-    points = {name: interval.point for name, interval in box.items()}
-    if points[VELOCITY] == 0.0:
-        closed = {**points, COMMAND: closed_command(model.plant)}
-        found = operating_point(model, closed, PRESSURES, PRESSURES)
-    else:
-        sliding = {name: points[name] for name in (POSITION, VELOCITY)}
-        vanish = (VELOCITY, *PRESSURES)
-        found = operating_point(model, sliding, (COMMAND, *PRESSURES), vanish)
-        if box[COMMAND].lower <= found.command[0] < box[COMMAND].upper:
-            return found
-    at = dict(zip(model.states, found.state, strict=True))
-    return operating_point(model, {**at, COMMAND: points[COMMAND]})
+    """See :meth:`linearize.axis.Axis.point`."""
+    return drive_axis(model.plant).point(model, box)
 
 
 def _servo_drive(plant: Plant) -> HybridModel:
     return hybrid_modes(plant, servo_drive_cuts(plant), servo_drive_point)
 
 
+def _servo_drive_regimes(plant: Plant) -> HybridModel:
+    return modes_by_regime(plant, drive_axis(plant), design_model(plant))
+
+
+def _crr_rig(plant: Plant) -> HybridModel:
+    return modes_by_regime(plant, rig_axis(plant), design_model(plant))
+
+
+def _crr_arm(plant: Plant) -> HybridModel:
+    return place_modes(plant, *joint_axes(plant), design_model(plant))
+
+
+def _crr_leg(plant: Plant) -> HybridModel:
+    return leg_modes(plant, joint_axes(plant))
+
+
+def _soft_joint(plant: Plant) -> HybridModel:
+    return filling_modes(plant, bellows(plant))
+
+
+def _servo_reservoir(plant: Plant) -> HybridModel:
+    return filling_modes(plant, reservoir(plant))
+
+
 SLIDE_MODES: dict[str, Callable[[Plant], HybridModel]] = {"servo_drive": _servo_drive}
 """Plants with a slide behind a proportional valve, which the controllers are designed on."""
 
-STANDARD_MODES: dict[str, Callable[[Plant], HybridModel]] = SLIDE_MODES | {"gearbox": gearbox_modes}
+STANDARD_MODES: dict[str, Callable[[Plant], HybridModel]] = SLIDE_MODES | {
+    "gearbox": gearbox_modes,
+    "crr_rig": _crr_rig,
+    "crr_arm": _crr_arm,
+    "crr_leg": _crr_leg,
+    "soft_joint": _soft_joint,
+    "soft_joint_parametric": _soft_joint,
+    "servo_reservoir": _servo_reservoir,
+}
+
+REGIME_MODES: dict[str, Callable[[Plant], HybridModel]] = {
+    "servo_drive": _servo_drive_regimes,
+    "crr_rig": _crr_rig,
+}
+"""Valve x flow regimes x friction x stops, for plants whose standard modes may be fewer."""
 
 
 def standard_modes(plant: Plant) -> HybridModel:
@@ -104,6 +98,17 @@ def standard_modes(plant: Plant) -> HybridModel:
         If its kind has none.
     """
     return _among(STANDARD_MODES, plant, "no standard modes for")
+
+
+def regime_modes(plant: Plant) -> HybridModel:
+    """Valve x flow regimes x friction x {free, stops}: more modes than the standard ones.
+
+    Raises
+    ------
+    UnknownNameError
+        If its kind has none.
+    """
+    return _among(REGIME_MODES, plant, "no modes by flow regimes for")
 
 
 def slide_modes(plant: Plant) -> HybridModel:

@@ -9,7 +9,8 @@ import numpy as np
 
 from estimators import ESTIMATORS
 from estimators.ahead import in_time
-from linearize.standard import POSITION, PRESSURES, VELOCITY, stroke_m
+from linearize.axes import stroke_m
+from linearize.standard import POSITION, PRESSURES, VELOCITY
 from studies.closed_loop_metrics import Metrics, measure
 from studies.scenarios import SAMPLE_TIME_S, SCENARIOS, Scenario
 from workbench.closed_loop import Hardware, LoopRecord, close_loop

@@ -8,7 +8,8 @@ from math import inf, isnan, nan
 
 import numpy as np
 
-from linearize.standard import POSITION, PRESSURES, SUPPLY, stroke_m
+from linearize.axes import stroke_m
+from linearize.standard import POSITION, PRESSURES, SUPPLY
 from studies.scenarios import LATE_S, SAMPLE_TIME_S, Scenario
 from workbench.closed_loop import LoopRecord
 from workbench.plant import Plant

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +10,7 @@ from workbench.units import public_name, si_unit
 
 if TYPE_CHECKING:
     from linearize.modes import HybridModel
+    from linearize.regions import Validity
     from studies.closed_loop_check import Check
     from workbench.comparison.compare import Comparison, RecordingComparison
     from workbench.diagnosis.result import Diagnosis, Law, NextRecording, Ranked, Where
@@ -91,16 +92,18 @@ def diagnosis_document(found: Diagnosis, unit_of: Mapping[str, str]) -> Document
     }
 
 
-def modes_document(rig_name: str, hybrid: HybridModel) -> Document:
-    """The modes as plain numbers, and what is left out of them."""
+def modes_document(
+    rig_name: str, hybrid: HybridModel, regions: Iterable[Validity] = ()
+) -> Document:
+    """The modes as plain numbers, what is left out of them, and which combinations are none."""
     from linearize.listing import document
 
-    left_out = [vars(item) for item in hybrid.model.left_out]
     return {
         "schema": "workbench.modes/1",
         "rig": rig_name,
-        "left_out": left_out,
-        "modes": document(hybrid),
+        "left_out": [vars(item) for item in hybrid.model.left_out],
+        "no_modes": [vars(item) for item in hybrid.no_modes],
+        "modes": document(hybrid, regions),
     }
 
 

@@ -2,56 +2,79 @@
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from studies.figures.modes import pole_figure
 from studies.figures.style import save
 from workbench.errors import whole_file
 
 if TYPE_CHECKING:
     from linearize.modes import HybridModel
+    from linearize.regions import Validity
     from workbench.diagnosis.result import NextRecording
     from workbench.rig import Rig
 
+ARRAYS = ("A", "B", "C", "D", "state", "command", "output", "drift", "scale")
+NAMES = ("state_names", "command_names", "output_names")
 
-def export_modes(hybrid: HybridModel, folder: Path, command: str) -> None:
-    """modes.mat, a struct array with A, B, C, D, point and drift; modes.txt; poles.*.
 
-    Of a slide also mode_map.* and step.*: where each mode is active, and the modes through a step
-    of the valve beside the plant.
+def export_modes(
+    hybrid: HybridModel, folder: Path, command: str, regions: Sequence[Validity] = ()
+) -> None:
+    """modes.mat, .npz and .txt; poles.*, mode_map.* and step.*.
+
+    The MAT file holds a struct array with A, B, C, D, point and drift; the NumPy file the same
+    arrays as ``A_0``, ``A_1`` and so on, and the names as ``name``, ``state_names_0``, ...  The
+    map shows where each mode is active, the step the modes beside the plant; neither of cuts that
+    do not cover them.
     """
     from linearize.hybrid_simulation import sampled_hybrid
-    from linearize.listing import table
-    from linearize.standard import SLIDE_MODES
-    from studies.slide_modes import STEP_S, map_figure, step_figure, step_of
+    from studies.figures.modes import pole_figure
+    from studies.mode_pictures import map_figure, step_figure, step_of
+    from studies.mode_views import VIEWS, view_of
+    from studies.modes_text import modes_text
 
     with whole_file(folder / "modes.mat") as unfinished:
         _write_mat(hybrid, unfinished)
+    with whole_file(folder / "modes.npz") as unfinished:
+        _write_npz(hybrid, unfinished)
     with whole_file(folder / "modes.txt") as unfinished:
-        unfinished.write_text(table(hybrid) + "\n", encoding="utf-8")
+        unfinished.write_text(modes_text(hybrid, regions) + "\n", encoding="utf-8")
     save(pole_figure(hybrid), folder / "poles", command)
-    if hybrid.plant.name in SLIDE_MODES:
-        modes = sampled_hybrid(hybrid, STEP_S)
+    if hybrid.plant.name not in VIEWS:
+        return
+    try:
+        modes = sampled_hybrid(hybrid, view_of(hybrid).sample_time_s)
         save(map_figure(modes), folder / "mode_map", command)
         save(step_figure(step_of({"modes": hybrid})), folder / "step", command)
+    except LookupError as error:
+        warnings.warn(f"no map and no step: {error.args[0]}", stacklevel=2)
+
+
+def _write_npz(hybrid: HybridModel, path: Path) -> None:
+    arrays: dict[str, np.ndarray] = {"name": np.array([mode.name for mode in hybrid.modes])}
+    for k, mode in enumerate(hybrid.modes):
+        arrays |= {f"{key}_{k}": getattr(mode, key) for key in ARRAYS}
+        arrays |= {f"{key}_{k}": np.array(getattr(mode, key)) for key in NAMES}
+    with path.open("wb") as file:
+        np.savez(file, **arrays)
 
 
 def _write_mat(hybrid: HybridModel, path: Path) -> None:
     from scipy.io import savemat
 
-    fields = ("A", "B", "C", "D", "state", "command", "output", "drift")
-    names = ("state_names", "command_names", "output_names")
-    kinds = [(key, object) for key in ("name", *fields, *names)]
+    kinds = [(key, object) for key in ("name", *ARRAYS, *NAMES)]
     modes = np.zeros(len(hybrid.modes), dtype=kinds)
     for row, mode in zip(modes, hybrid.modes, strict=True):
         row["name"] = mode.name
-        for key in fields:
+        for key in ARRAYS:
             value = getattr(mode, key)
             row[key] = value if value.ndim == 2 else value[:, None]
-        for key in names:
+        for key in NAMES:
             row[key] = np.array(getattr(mode, key), dtype=object)
     with path.open("wb") as file:
         savemat(file, {"modes": modes})

@@ -1,4 +1,4 @@
-"""Study ``mode-placement``: how few modes predict a drive, and where their points should lie.
+"""Study ``mode-placement``: how few modes predict a plant, and where their points should lie.
 
 The modes are placed on one recording and judged on another, over 50 ms, with the plant's own
 simulation under the recorded commands as the truth.
@@ -14,18 +14,19 @@ from linearize.hybrid_simulation import sampled_hybrid
 from linearize.modes import HybridModel
 from linearize.placement import growing_modes
 from linearize.prediction import PredictionError, fitted_single, prediction_of, single_of
-from linearize.regions import Validity, validity
+from linearize.regions import validity
 from linearize.standard import POSITION, VELOCITY, standard_modes
 from linearize.visits import Windows, visited, windows
 from studies.demo import DATA
 from studies.figures.prediction import placement_figure, point_figure
-from studies.slide_modes import STEP_S, Step, map_figure, step_figure, step_of
+from studies.gearbox_driving import Driving, driven, driving_table
+from studies.mode_pictures import STEP_S, Step, map_figure, step_figure, step_of
+from studies.modes_text import region_table
 from studies.study import Claim, Extent, Outcome, Study
-from studies.text import columns, number, shown
+from studies.text import columns
 from workbench.comparison.run import run as run_rig
 from workbench.reading import read_recording
 from workbench.rig import load_rig
-from workbench.units import public_name
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -74,7 +75,12 @@ def run(folder: Path, extent: Extent, say: Callable[[str], None]) -> Outcome:
         "single": {name: prediction_of(singles[name], each) for name, each in judged.items()},
         "alone": {name: _best_alone(hybrid, each) for name, each in judged.items()},
     }
-    text = f"{_error_table(errors, found)}\n\n{_region_table(regions)}"
+    gearbox = driven(say)
+    tables = (
+        _error_table(errors, found),
+        driving_table(gearbox),
+        region_table(regions, "standard mode"),
+    )
     figures = {
         "error_by_number": _curve(errors, found, len(hybrid.modes)),
         "map_standard": map_figure(sampled_hybrid(hybrid, STEP_S)),
@@ -86,7 +92,9 @@ def run(folder: Path, extent: Extent, say: Callable[[str], None]) -> Outcome:
         "placed": {name: {str(n): e.total for n, e in row.items()} for name, row in errors.items()},
         **{label: {name: e.total for name, e in row.items()} for label, row in found.items()},
     }
-    return Outcome(text, (*_claims(errors, found, hybrid, step),), figures, numbers)
+    numbers["gearbox"] = {"placed": gearbox.placed.total, "single": gearbox.single.total}
+    claims = (*_claims(errors, found, hybrid, step), _gearbox_claim(gearbox))
+    return Outcome("\n\n".join(tables), claims, figures, numbers)
 
 
 def _error(hybrid: HybridModel, judged: Windows) -> PredictionError:
@@ -128,6 +136,13 @@ def _claims(errors: Errors, found: Others, hybrid: HybridModel, step: Step) -> I
     yield Claim(claim, f"{share:.1%}", share <= 0.05)
 
 
+def _gearbox_claim(found: Driving) -> Claim:
+    n = len(found.hybrid.modes)
+    claim = f"gearbox, {n} placed modes: at most a third of the best single model's, too"
+    told = f"{found.placed.total:.4f} of {found.single.total:.4f}, {found.share:.2f}"
+    return Claim(claim, told, found.share <= THIRD)
+
+
 def _error_table(errors: Errors, found: Others) -> str:
     head = ("modes", f"error on {PLACED_ON}", f"on {JUDGED_ON}", "over the single model's")
     single = found["single"][JUDGED_ON].total
@@ -146,25 +161,9 @@ def _error_table(errors: Errors, found: Others) -> str:
     )
 
 
-def _region_table(regions: list[Validity]) -> str:
-    names = max((each.alone for each in regions), key=len)
-    head = ("standard mode", "error at its point", *map(public_name, names))
-    rows = [
-        (
-            each.name,
-            number(each.at_point, 2),
-            *(shown(each.together[n], n, 2) if n in each.together else "held" for n in names),
-        )
-        for each in regions
-    ]
-    limit = f"{regions[0].tolerance:g} of any scale over {regions[0].horizon_s:g} s"
-    told = f"half-widths of boxes in which a mode errs less than {limit}"
-    return f"{told}\n{columns(head, rows)}"
-
-
 STUDY = Study(
     name="mode-placement",
-    question="how few linear modes predict a servo drive over 50 ms, and where do they lie?",
+    question="how few linear modes predict a drive or a gearbox over 50 ms, and where are they?",
     source="issue of the hybrid modes; paper 003 Sec. V; physics.md 4.3",
     run=run,
 )

@@ -229,6 +229,13 @@ def test_modes_are_printed_and_exported(folder, tmp_path):
     assert len(document["modes"]) == 27
     found = loadmat(place / "modes.mat", simplify_cells=True)["modes"]
     assert np.array_equal(found[0]["A"], np.array(document["modes"][0]["A"]))
+    arrays = np.load(place / "modes.npz")
+    assert arrays["name"].tolist() == [mode["name"] for mode in document["modes"]]
+    assert np.array_equal(arrays["B_26"], np.array(document["modes"][26]["B"]))
+    drawn = {path.name for path in place.glob("*.pdf")}
+    assert drawn == {"poles.pdf", "mode_map.pdf", "step.pdf"}
+    assert document["modes"][0]["validity"]["horizon_s"] == 0.05
+    assert "half-widths of boxes in which a mode errs less than 0.05" in answer.stdout
 
 
 def test_a_design_is_written_and_checked_and_the_answer_is_the_exit_code(folder, tmp_path):

@@ -8,7 +8,7 @@ import pytest
 from commands import call
 
 from controllers.condensed import MpcSpec, limits_of
-from linearize.standard import stroke_m
+from linearize.axes import stroke_m
 from studies.checking import differences
 from studies.closed_loop_check import Check
 from studies.closed_loop_metrics import LOST_SHARE, Metrics, table

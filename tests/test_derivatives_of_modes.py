@@ -1,27 +1,50 @@
-"""A, B, C, D of every mode against central differences of the whole plant's rates.
+"""A, B, C, D of every mode of every plant against central differences of the whole plant's rates.
 
 The plant is evaluated with all its states, the left-out ones where they follow the kept ones; what
-is rigidly coupled is put together here by its masses.  Away from kinks: the steps stay on one side
-of Neutral, of the direction of sliding and of the choking of a valve.
+is rigidly coupled is put together here by its masses, and what is held by the leg's mass matrix.
+Away from kinks: the steps stay on one side of Neutral, of the direction of sliding and of the
+choking of a valve.
 """
 
+import casadi as ca
 import numpy as np
 import pytest
 
 from linearize.modes import hybrid_modes, placed_at
 from linearize.shift_modes import DIRECTIONS, ShiftPoints, gearbox_modes, side_cut, switched_modes
 from linearize.shifting import DETENT, FLOWS, HEAT, shift_model
-from linearize.standard import COMMAND, servo_drive_cuts, standard_modes
+from linearize.standard import (
+    REGIME_MODES,
+    STANDARD_MODES,
+    servo_drive_cuts,
+    standard_modes,
+)
+from workbench.leg import Leg
+from workbench.plants import PLANTS
 from workbench.plants.gearbox import gearbox
 from workbench.plants.servo_drive import servo_drive
 
 STEP = 1e-5  # of the scale of a state, and of a command's: the curvature of the valve's area
 # jumps where it is closed, and a difference over that errs in proportion to the step
 ALLOWED = 1e-6  # of the largest scaled entry
-COMMAND_SCALE = {COMMAND: 1.0, **dict.fromkeys(FLOWS, 1e-2)}
+COMMAND_SCALE = {"valve.pwm": 0.1, **dict.fromkeys(FLOWS, 1e-2)}  # 1 V of any other
 
 
-def whole_rates(hybrid, x, u):
+def held_by_the_leg(plant, x, rate, held):
+    """Accelerations of the leg with some joints held: M_ff a_f = (M a)_f, none of the held."""
+    leg = next(part for part in plant.parts if isinstance(part, Leg))
+    names = [f"{joint}.velocity_rad_s" for joint in leg.joints]
+    free = [k for k, name in enumerate(names) if name not in held]
+    M = ca.DM(leg.mass_matrix([x[f"{joint}.angle_rad"] for joint in leg.joints])).full()
+    torque = M @ [rate[name] for name in names]
+    found = dict.fromkeys(names, 0.0)
+    if free:
+        inverse = np.linalg.inv(M[np.ix_(free, free)])
+        found |= zip((names[k] for k in free), inverse @ torque[free], strict=True)
+    return rate | found
+
+
+def whole_rates(hybrid, x, u, held=()):
     """Rates of the kept states, shape (n_x,), from the plant with all of its own, and outputs."""
     model, plant = hybrid.model, hybrid.model.plant
     changed = plant.with_values(dict(model.nulls))
@@ -35,6 +58,8 @@ def whole_rates(hybrid, x, u):
             carried.append((0.35, rate["floating_piston.velocity_m_s"]))
         force_n = sum(mass * a for mass, a in carried)
         rate["main_piston.velocity_m_s"] = force_n / sum(mass for mass, _ in carried)
+    if model.pushes:
+        rate = held_by_the_leg(plant, dict(zip(model.states, x, strict=True)), rate, held)
     return np.array([rate[name] for name in model.states]), outputs.full().ravel()
 
 
@@ -46,6 +71,7 @@ def differences(hybrid, mode, sizes):
     x = np.array([at.get(n, v) for n, v in zip(model.states, model.initial, strict=True)])
     u = mode.sent(model, mode.command)
     rows = [model.states.index(name) for name in mode.state_names]
+    stuck = [name for region in mode.box.values() for name in region.holds]
     columns = []
     for name, size in zip((*mode.state_names, *mode.command_names), sizes, strict=True):
         ends = []
@@ -54,14 +80,14 @@ def differences(hybrid, mode, sizes):
             vector, names = (x_moved, model.states) if name in model.states else (u_moved, ())
             place = names.index(name) if names else model.commands.index(name)
             vector[place] += sign * STEP * size
-            rates, outputs = whole_rates(hybrid, x_moved, u_moved)
+            rates, outputs = whole_rates(hybrid, x_moved, u_moved, stuck)
             ends.append(np.concatenate([rates[rows], outputs]))
         columns.append((ends[0] - ends[1]) / (2.0 * STEP))
     return np.column_stack(columns)
 
 
 def assert_exact(hybrid, mode):
-    command = [COMMAND_SCALE[name] for name in mode.command_names]
+    command = [COMMAND_SCALE.get(name, 1.0) for name in mode.command_names]
     sizes = np.array([*mode.scale, *command])
     found = np.block([[mode.A, mode.B], [mode.C, mode.D]]) * sizes
     expected = differences(hybrid, mode, sizes)
@@ -100,12 +126,38 @@ def test_modes_of_the_gearbox_with_dry_friction_and_detent():
             assert_exact(hybrid, mode)
 
 
-def test_modes_of_the_servo_drive():
-    hybrid = standard_modes(servo_drive())
+@pytest.mark.parametrize(
+    ("plant", "number"),
+    [
+        ("servo_drive", 27),
+        ("crr_rig", 60),
+        ("crr_arm", 33),
+        ("crr_leg", 216),
+        ("servo_reservoir", 5),
+        ("soft_joint", 4),
+        ("soft_joint_parametric", 2),
+    ],
+)
+def test_standard_modes_of_every_plant(plant, number):
+    hybrid = standard_modes(PLANTS[plant]())
 
-    assert len(hybrid.modes) == 27
+    assert len(hybrid.modes) == number
     for mode in hybrid.modes:
         assert_exact(hybrid, mode)
+
+
+def test_modes_of_the_servo_drive_by_flow_regimes():
+    hybrid = REGIME_MODES["servo_drive"](servo_drive())
+
+    assert len(hybrid.modes) == 45
+    for mode in hybrid.modes:
+        assert_exact(hybrid, mode)
+
+
+def test_no_plant_with_a_command_is_without_standard_modes():
+    commanded = {name for name, make in PLANTS.items() if make().commands}
+
+    assert commanded == set(STANDARD_MODES)
 
 
 def test_a_difference_would_show_an_entry_that_is_wrong():

@@ -7,7 +7,7 @@ import pytest
 
 from linearize.cuts import Interval
 from linearize.discrete import sampled
-from linearize.holding import hold_of
+from linearize.holding import holds_of
 from linearize.hybrid_simulation import sampled_hybrid
 from linearize.modes import HybridModel
 from linearize.shift_modes import gearbox_modes
@@ -143,7 +143,7 @@ def test_a_cut_on_something_else_than_states_and_commands_is_an_error(hybrid):
 
 
 def test_a_mode_that_holds_nothing_has_no_hold(hybrid):
-    assert hold_of(hybrid, hybrid["closed slide + middle"]) is None
+    assert not holds_of(hybrid, hybrid["closed slide + middle"])
 
 
 @pytest.fixture(scope="module")

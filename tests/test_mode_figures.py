@@ -6,7 +6,7 @@ import pytest
 from linearize.hybrid_simulation import sampled_hybrid
 from linearize.standard import COMMAND, POSITION, VELOCITY, standard_modes
 from studies.figures.prediction import placement_figure, point_figure
-from studies.slide_modes import STEP_S, map_figure, step_figure, step_of
+from studies.mode_pictures import STEP_S, map_figure, step_figure, step_of
 from workbench.plants.servo_drive import servo_drive
 
 

@@ -11,7 +11,7 @@ from linearize.hybrid_simulation import sampled_hybrid
 from linearize.placement import growing_modes, placed_modes
 from linearize.prediction import fitted_single, prediction_of, single_of
 from linearize.standard import COMMAND, POSITION, VELOCITY, standard_modes
-from linearize.visits import windows
+from linearize.visits import joined, windows
 from workbench.plants.servo_drive import STROKE_M, servo_drive
 
 STEP_S = 1e-3
@@ -149,6 +149,7 @@ def test_a_number_of_modes_that_cannot_be_had_is_an_error(hybrid, seen, number, 
         seen,
         states=seen.states[:, 400:2400],
         commands=seen.commands[:, 400:2400],
+        touching=seen.touching[400:2400],
         free=seen.free[400:2400],
     )
 
@@ -156,8 +157,19 @@ def test_a_number_of_modes_that_cannot_be_had_is_an_error(hybrid, seen, number, 
         placed_modes(hybrid, short, number)
 
 
-def test_a_manoeuvre_that_never_rests_cannot_place_the_sticking_modes(hybrid, seen):
+def test_what_a_manoeuvre_never_visits_keeps_the_mode_that_it_has(hybrid, seen):
+    """A manoeuvre without rest: the sticking mode stays, the others are placed."""
     moving = replace(seen, free=seen.free & (np.abs(seen.states[1]) > 2e-3))
+    placed = placed_modes(hybrid, moving, 10)
+    (stick,) = (mode for mode in placed.modes if "stick" in mode.name)
 
-    with pytest.raises(ValueError, match=r"never visits 'stick' of slide\.velocity_m_s"):
-        placed_modes(hybrid, moving, 10)
+    assert pytest.approx(hybrid["charge b stick near a"].A) == stick.A
+    assert [*stick.box] == [VELOCITY]
+
+
+def test_manoeuvres_are_joined_with_a_gap_between_them(seen):
+    both = joined([seen, seen])
+    n = seen.states.shape[1]
+
+    assert both.starts == (0, n)
+    assert windows(both).states.shape[2] == 2 * windows(seen).states.shape[2]

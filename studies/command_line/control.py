@@ -18,7 +18,7 @@ from studies.command_line.application import (
     command_text,
     example,
 )
-from studies.command_line.files import writable, write_json
+from studies.command_line.files import read_all, writable, write_json
 
 DesignFile = Annotated[Path, typer.Argument(metavar="DESIGN", help="What `design` wrote.")]
 Several = Annotated[int, typer.Option("--runs", metavar="N", min=1, help="Plants to draw.")]
@@ -29,30 +29,56 @@ CHECK = "workbench check rig.toml lq.toml --estimator mhe --scenario step --figu
 @app.command(cls=Spread, epilog=example("workbench modes rig.toml --export modes"))
 def modes(
     rig: RigFile,
+    place: Annotated[
+        list[Path] | None,
+        typer.Option("--place", metavar="REC...", help="Put the points where recordings go."),
+    ] = None,
+    number: Annotated[
+        int | None, typer.Option("--number", metavar="N", min=1, help="Modes to place.")
+    ] = None,
+    regimes: Annotated[
+        bool, typer.Option("--regimes", help="By flow regimes and stops, where there are fewer.")
+    ] = False,
+    cuts: Annotated[
+        Path | None, typer.Option("--cuts", metavar="CUTS.toml", help="Intervals of your own.")
+    ] = None,
+    horizon: Annotated[
+        str | None, typer.Option("--horizon", metavar="TIME", help="To predict; '50 ms'.")
+    ] = None,
+    tolerance: Annotated[
+        float | None, typer.Option("--tolerance", metavar="SHARE", help="Of a state's scale; 0.05.")
+    ] = None,
+    no_validity: Annotated[
+        bool, typer.Option("--no-validity", help="Without the regions in which modes predict.")
+    ] = False,
     json: Json = None,
     export: Annotated[
-        Path | None, typer.Option("--export", metavar="DIR", help="MAT file, table and pole map.")
+        Path | None,
+        typer.Option("--export", metavar="DIR", help="MAT and NumPy file, table, figures."),
     ] = None,
     quiet: Quiet = False,
 ) -> None:
-    """The hybrid state-space modes: poles, controllability, observability, error."""
+    """The hybrid state-space modes: poles, controllability, observability, error, validity."""
     with answering(quiet) as say:
-        from linearize.listing import left_out, table
-        from linearize.standard import standard_modes
         from studies.documents import modes_document
+        from studies.mode_choice import chosen_modes, regions_of, trusted
+        from studies.modes_text import modes_text
         from workbench.rig import load_rig
 
         writable(json, folders=[export])
+        limits = trusted(horizon, tolerance)
         known = load_rig(rig)
+        recordings = read_all(known, place, say)
         say("linearising")
-        hybrid = standard_modes(known.plant)
-        write_json(json, modes_document(known.name, hybrid))
+        hybrid = chosen_modes(known, recordings, number, regimes, cuts)
+        regions = () if no_validity else regions_of(hybrid, *limits, say)
+        write_json(json, modes_document(known.name, hybrid, regions))
         if export:
             from studies.export import export_modes
 
-            export_modes(hybrid, export, command_text())
+            export_modes(hybrid, export, command_text(), regions)
             say(f"modes in {export}")
-        typer.echo(f"{table(hybrid)}\n\nleft out of the modes:\n{left_out(hybrid)}")
+        typer.echo(modes_text(hybrid, regions))
 
 
 @app.command(cls=Spread, epilog=example("workbench design rig.toml --controller lq -o lq.toml"))

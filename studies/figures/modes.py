@@ -21,7 +21,7 @@ def pole_figure(hybrid: HybridModel) -> Figure:
     """Poles of every mode: a panel per interval of the first cut, markers for the second."""
     first, *rest = max((mode.box for mode in hybrid.modes), key=len)
     second = rest[0] if rest else first
-    panels = list(dict.fromkeys(mode.box[first].label for mode in hybrid.modes))
+    panels = list(dict.fromkeys(_label(mode, first) for mode in hybrid.modes))
     kinds = list(dict.fromkeys(_label(mode, second) for mode in hybrid.modes))
     with styled():
         figure = new_figure(PAGE_IN, 2.6)
@@ -31,7 +31,7 @@ def pole_figure(hybrid: HybridModel) -> Figure:
                 chosen = [
                     mode
                     for mode in hybrid.modes
-                    if mode.box[first].label == label and _label(mode, second) == kind
+                    if _label(mode, first) == label and _label(mode, second) == kind
                 ]
                 if not chosen:
                     continue

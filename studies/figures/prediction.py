@@ -9,7 +9,7 @@ import numpy as np
 
 from studies.figures.style import BLACK, GREY, PAGE_IN, new_figure, styled
 from studies.text import labelled
-from workbench.units import display_scale
+from workbench.units import display_scale, display_unit, public_name
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from linearize.hybrid_simulation import HybridRun
     from linearize.modes import HybridModel
 
+LINES = ("-", "--", ":")
 MARKERS = ("o", "s", "^", "D")
 REAL_PARTS = (-1000, -100, -10, 0, 10, 100)  # ticks, 1/s
 
@@ -68,8 +69,9 @@ def overlay_figure(
     model, time_s = hybrid.model, sample_time_s * np.arange(plant.shape[1])
     first = next(iter(runs.values()))
     with styled():
-        figure = new_figure(PAGE_IN, 4.6)
-        grid = figure.add_gridspec(3, 2)
+        figure = new_figure(PAGE_IN, 1.6 + 1.5 * -(-min(len(model.states), 4) // 2))
+        rows = -(-min(len(model.states), 4) // 2)
+        grid = figure.add_gridspec(rows + 1, 2)
         for k, name in enumerate(model.states[:4]):
             axes = figure.add_subplot(grid[k // 2, k % 2])
             scale = display_scale(name)
@@ -81,12 +83,16 @@ def overlay_figure(
                 axes.plot(time_s, scale.from_si(run.states[k]), label=label)
             axes.set_ylabel(labelled(name))
         handles = axes.get_legend_handles_labels()
-        below = figure.add_subplot(grid[2, 0])
-        for name, row in zip(model.commands, commands, strict=True):
-            below.plot(time_s, display_scale(name).from_si(row), color=BLACK, linestyle="-")
+        below = figure.add_subplot(grid[rows, 0])
+        for name, row, line in zip(model.commands, commands, LINES, strict=False):
+            given = display_scale(name).from_si(row)
+            below.plot(time_s, given, color=BLACK, linestyle=line, label=public_name(name))
             below.set_ylabel(labelled(name))
+        if len(model.commands) > 1:
+            below.set_ylabel(f"commands ({display_unit(model.commands[0])})")
+            below.legend(fontsize=6)
         below.set_xlabel("time (s)")
-        active = figure.add_subplot(grid[2, 1])
+        active = figure.add_subplot(grid[rows, 1])
         there = list(dict.fromkeys(first.modes))
         place = [there.index(k) for k in first.modes]
         active.step(time_s, place, where="post", color=BLACK, linestyle="-")

@@ -41,14 +41,21 @@ def run(rig: Rig, recording: Recording) -> Recording:
     ArithmeticError
         If the solution is not finite.
     """
-    plant = _plant_for(rig, recording).lean()
+    plant = plant_for(rig, recording).lean()
     pieces = [simulate(plant, p, guessed_states(plant, p)[0, :, 0]) for p in recording.pieces]
     found = _joined(recording, pieces)
     warn_beyond(rig, found)
     return found
 
 
-def _plant_for(rig: Rig, recording: Recording) -> Plant:
+def plant_for(rig: Rig, recording: Recording) -> Plant:
+    """The rig's plant with what was recorded of its optional inputs as measured inputs.
+
+    Raises
+    ------
+    InputError
+        If a command or measured input is missing.
+    """
     plant, carried = rig.plant, recording.channels
     needed = [s.name for s in (*plant.commands, *plant.measured_inputs)]
     missing = [public_name(name) for name in needed if name not in carried]
