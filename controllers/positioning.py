@@ -1,7 +1,8 @@
 """What every position controller of a pneumatic slide shares: target, dry friction, rest.
 
-Steady sliding.  At a speed v the slide needs certain pressures and a certain opening; both are
-straight lines in v that follow from the modes, Coulomb friction in their drift included.
+Sliding.  At a speed v, an acceleration and a jerk the slide needs certain pressures and a certain
+opening; each is linear in the three and follows from the modes, Coulomb friction in their drift
+included.  The three are differences of the coming reference.
 
 Stribeck.  Below the Stribeck velocity friction rises above Coulomb's; a share of that rise is
 added to the wanted pressure difference in the direction in which the slide is to move.
@@ -33,6 +34,7 @@ from workbench.effects.stribeck_friction import StribeckFriction
 from workbench.parts import Chamber
 
 FAST_M_S = 1e3  # no Stribeck peak there
+PREVIEW = 4  # columns of the reference whose differences are speed, acceleration and jerk
 STATES = (POSITION, VELOCITY, *PRESSURES)
 
 
@@ -44,8 +46,9 @@ class PositioningSpec:
     ----------
     approach_m
         Errors above this count as this, which limits the speed of approach.
-    fastest_m_s
-        A reference that moves faster has jumped, and asks for no speed.
+    fastest_m_s, hardest_m_s2, sharpest_m_s3
+        A reference that moves faster has jumped, and asks for no speed; one that accelerates harder
+        has a corner, and asks for no acceleration; likewise its jerk.
     band_m, leave_m, resting_m_s
         Rest begins inside ``band_m`` below ``resting_m_s`` and ends outside ``leave_m``.
     integrate_m
@@ -62,6 +65,8 @@ class PositioningSpec:
 
     approach_m: float = 0.03
     fastest_m_s: float = 2.0
+    hardest_m_s2: float = 30.0
+    sharpest_m_s3: float = 1e3
     band_m: float = ranged(5e-5)
     leave_m: float = ranged(1e-4)
     resting_m_s: float = ranged(5e-3)
@@ -83,14 +88,19 @@ class Memory:
 
 
 @dataclass(frozen=True)
-class Steady:
-    """Pressures and opening of steady sliding, at zero speed and per m/s, on one mode.
+class Sliding:
+    """Pressures and opening of a sliding slide on one mode, (p_a, p_b, opening).
 
-    level, slope       (p_a, p_b, opening), shape (3,)
+    level      at zero speed, shape (3,)
+    slopes     per m/s, m/s2 and m/s3, shape (3, 3)
     """
 
     level: np.ndarray
-    slope: np.ndarray
+    slopes: np.ndarray
+
+    def at(self, motion: np.ndarray) -> np.ndarray:
+        """Those of a motion (speed, acceleration, jerk), shape (3,)."""
+        return self.level + self.slopes @ motion
 
 
 @dataclass(frozen=True)
@@ -99,7 +109,7 @@ class Task:
 
     x             position, velocity and pressures, shape (4,)
     target        where they should be, shape (4,); the position within the approach of x
-    opening_v     of steady sliding at the wanted speed
+    opening_v     of the wanted motion
     error_m       true error, not limited
     ahead         1 forward, 0 backward
     rests         the valve stays shut
@@ -129,30 +139,38 @@ class Positioning:
 
     spec: PositioningSpec
     valve: ThroughValve
-    steady: Schedule[Steady]
+    sliding: Schedule[Sliding]
     friction: StribeckFriction | None
     area_m2: float
 
     def task(
         self, memory: Memory, reference: np.ndarray, x: np.ndarray, sample_time_s: float
     ) -> Task:
-        """The task now, from a reference of at least two columns, shape (1, preview)."""
+        """The task now, from the coming reference, shape (1, PREVIEW) or longer."""
         spec, error_m = self.spec, float(x[0] - reference[0, 0])
-        speed_m_s = (reference[0, 1] - reference[0, 0]) / sample_time_s
-        if abs(speed_m_s) > spec.fastest_m_s:
-            speed_m_s = 0.0
+        motion = self._motion(reference[0, :PREVIEW], sample_time_s)
+        speed_m_s = motion[0]
         wish = (speed_m_s - spec.turn_per_s * error_m) / spec.turn_m_s
         ahead = 0.5 + 0.5 * np.tanh(wish)
-        steady = sum(
-            w * (s.level + s.slope * speed_m_s) for w, s in self.steady.weighted(x[0], ahead)
-        )
+        needed = sum(w * each.at(motion) for w, each in self.sliding.weighted(x[0], ahead))
         rise_n = self._stribeck_n(x[1]) * (2.0 * ahead - 1.0)
         rise_pa = rise_n / (2.0 * self.area_m2)
         near = x[0] - np.clip(error_m, -spec.approach_m, spec.approach_m)
-        target = np.array([near, speed_m_s, steady[0] + rise_pa, steady[1] - rise_pa])
+        target = np.array([near, speed_m_s, needed[0] + rise_pa, needed[1] - rise_pa])
         rests = self._rests(memory, error_m, x[1], speed_m_s)
         rate_m = self._rate_m(error_m, x[1])
-        return Task(x, target, steady[2], error_m, speed_m_s, ahead, rests, rate_m, rise_n)
+        return Task(x, target, needed[2], error_m, speed_m_s, ahead, rests, rate_m, rise_n)
+
+    def _motion(self, coming: np.ndarray, sample_time_s: float) -> np.ndarray:
+        """Speed, acceleration and jerk of the reference, shape (3,), none where it jumps."""
+        spec = self.spec
+        steps = np.diff(coming) / sample_time_s
+        if np.abs(steps).max() > spec.fastest_m_s:
+            return np.zeros(3)
+        bends = np.diff(steps) / sample_time_s
+        jerk = (bends[1] - bends[0]) / sample_time_s
+        bend = bends[0] if np.abs(bends).max() <= spec.hardest_m_s2 else 0.0
+        return np.array([steps[0], bend, jerk if abs(jerk) <= spec.sharpest_m_s3 else 0.0])
 
     def _rests(self, memory: Memory, error_m: float, v_m_s: float, speed_m_s: float) -> bool:
         spec = self.spec
@@ -195,23 +213,30 @@ def positioning(hybrid: HybridModel, spec: PositioningSpec) -> Positioning:
     return Positioning(
         spec=spec,
         valve=through_valve(real, spec.smooth_v),
-        steady=scheduled(hybrid, lambda mode: steady_sliding(mode, centre_v)),
+        sliding=scheduled(hybrid, lambda mode: sliding_on(mode, centre_v)),
         friction=friction[0] if friction else None,
         area_m2=next(m.area_m2 for m in plant.parts if isinstance(m, Chamber)),
     )
 
 
-def steady_sliding(mode: Mode, centre_v: float) -> Steady:
-    """Where acceleration and pressure rates of a mode vanish, as a line in the velocity.
+def sliding_on(mode: Mode, centre_v: float) -> Sliding:
+    """Pressures p and opening u that go with a motion of the slide, linear in v, dv/dt and d2v/dt2.
 
-    0 = drift + A_p (p - p0) + A_v (v - v0) + B (u - u0), solved for p and u.
+    (dv/dt, dp/dt) = drift + A_p (p - p0) + A_v (v - v0) + B (u - u0), solved for p and u, where
+    dp/dt follows from p itself: what p changes with v times dv/dt, and so on.
     """
     rows = [mode.state_names.index(name) for name in (VELOCITY, *PRESSURES)]
     pressures = [mode.state_names.index(name) for name in PRESSURES]
     v = mode.state_names.index(VELOCITY)
-    known = np.column_stack([mode.A[np.ix_(rows, pressures)], mode.B[rows]])
-    size = mode.scale[rows, None]
-    right = -np.column_stack([mode.drift[rows], mode.A[rows, v]])
-    found = np.linalg.solve(known / size, right / size)
-    at_point = np.array([*mode.state[pressures], mode.command[0] - centre_v]) + found[:, 0]
-    return Steady(at_point - found[:, 1] * mode.state[v], found[:, 1])
+    size = mode.scale[rows]
+    known = np.column_stack([mode.A[np.ix_(rows, pressures)], mode.B[rows]]) / size[:, None]
+
+    def solved(rates: np.ndarray) -> np.ndarray:
+        return np.linalg.solve(known, rates / size)
+
+    centre = np.array([*mode.state[pressures], mode.command[0] - centre_v])
+    per_speed = solved(-mode.A[rows, v])
+    per_bend = solved(np.array([1.0, *per_speed[:2]]))
+    per_jerk = solved(np.array([0.0, *per_bend[:2]]))
+    level = centre + solved(-mode.drift[rows]) - per_speed * mode.state[v]
+    return Sliding(level, np.column_stack([per_speed, per_bend, per_jerk]))

@@ -8,7 +8,14 @@ import numpy as np
 from scipy.linalg import solve_discrete_are
 
 from controllers.margins import Law, integral_of
-from controllers.positioning import STATES, Memory, Positioning, PositioningSpec, positioning
+from controllers.positioning import (
+    PREVIEW,
+    STATES,
+    Memory,
+    Positioning,
+    PositioningSpec,
+    positioning,
+)
 from controllers.scheduled import Schedule, scheduled
 from linearize.discrete import sampled
 from linearize.modes import HybridModel, Mode
@@ -48,7 +55,7 @@ class Gain:
 
 @dataclass(frozen=True)
 class StateFeedback:
-    """Opening = that of steady sliding - K (x - target) - K_i integral, one gain per mode, mixed.
+    """Opening = that of the motion - K (x - target) - K_i integral, one gain per mode, mixed.
 
     The integral rests while the opening is at its limit, so that it cannot wind up.
     """
@@ -56,7 +63,7 @@ class StateFeedback:
     task: Positioning
     gains: Schedule[Gain]
     sample_time_s: float
-    preview: int = 2
+    preview: int = PREVIEW
 
     @property
     def laws(self) -> Schedule[Law]:
