@@ -14,14 +14,15 @@ Engineering Practice 12 (2004) 629, with the force in place of the pressures.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import tau
 
 import numpy as np
 
+from controllers.lq import gain_of, with_integral
 from controllers.margins import Law, integral_of
+from controllers.motion import PREVIEW
 from controllers.positioning import (
-    PREVIEW,
     STATES,
     Memory,
     Positioning,
@@ -30,11 +31,15 @@ from controllers.positioning import (
 )
 from controllers.scheduled import Schedule, scheduled
 from controllers.spec import ranged
-from linearize.discrete import sampled
 from linearize.modes import HybridModel, Mode
 from linearize.standard import PRESSURES, SUPPLY, VELOCITY
 from workbench.contracts import Command, Estimate
 from workbench.parts import Atmosphere
+
+FINE = PositioningSpec(
+    approach_m=0.012, band_m=2.2e-5, leave_m=5e-5, turn_per_s=120.0, resting_m_s=5e-3
+)
+"""The force loop catches a slide that breaks away: rest can be sought in a narrow band."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,12 +59,12 @@ class CascadeSpec:
     """
 
     sample_time_s: float = 1e-3
-    bandwidth_hz: float = 5.0
-    damping: float = 0.9
-    force_bandwidth_hz: float = 20.0
+    bandwidth_hz: float = 12.0
+    damping: float = 1.0
+    force_bandwidth_hz: float = 60.0
     integral_time_s: float = 0.15
     force_share: float = ranged(0.8, most=1.0, above=True)
-    positioning: PositioningSpec = field(default_factory=PositioningSpec)
+    positioning: PositioningSpec = field(default_factory=lambda: FINE)
 
 
 @dataclass(frozen=True)
@@ -155,16 +160,6 @@ def cascade_gain(mode: Mode, area_m2: float, spec: CascadeSpec) -> CascadeGain:
     damping = 2.0 * spec.damping * w + mode.A[v, v]  # less what the mode damps by itself
     outer = mass_kg * np.array([w**2, damping, w**2 / spec.integral_time_s])
     gain = CascadeGain(tau * spec.force_bandwidth_hz / rise, -taken / rise, outer, np.zeros(0))
-    poles = closed_poles(mode, gain.feedback(area_m2), gain.force * outer[2], spec.sample_time_s)
-    return CascadeGain(gain.force, gain.speed, outer, poles)
-
-
-def closed_poles(
-    mode: Mode, feedback: np.ndarray, integral: float, sample_time_s: float
-) -> np.ndarray:
-    """Poles of the sampled mode under a state feedback with integral, on the plane of s, 1/s."""
-    small, n = sampled(mode, sample_time_s), len(mode.state_names)
-    F, G = np.eye(n + 1), np.zeros((n + 1, 1))
-    F[:n, :n], F[n, 0], G[:n] = small.F, sample_time_s, small.G
-    K = np.array([[*feedback, integral]])
-    return np.log(np.linalg.eigvals(F - G @ K).astype(complex)) / sample_time_s
+    K = np.array([*gain.feedback(area_m2), gain.force * outer[2]])
+    poles = gain_of(*with_integral(mode, spec.sample_time_s), K, spec.sample_time_s).poles
+    return replace(gain, poles=poles)

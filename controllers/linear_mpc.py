@@ -21,7 +21,8 @@ import numpy as np
 
 from controllers.condensed import MpcSpec, Program, limits_of, program_of
 from controllers.margins import Law
-from controllers.positioning import PREVIEW, STATES, Memory, Positioning, Task, positioning
+from controllers.motion import PREVIEW
+from controllers.positioning import STATES, Memory, Positioning, Task, positioning
 from controllers.scheduled import Schedule, scheduled
 from linearize.modes import HybridModel
 from linearize.reduction import closed_command

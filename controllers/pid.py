@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from controllers.margins import Law
+from controllers.motion import PREVIEW
 from controllers.positioning import (
-    PREVIEW,
     STATES,
     Memory,
     Positioning,

@@ -1,8 +1,7 @@
 """What every position controller of a pneumatic slide shares: target, dry friction, rest.
 
-Sliding.  At a speed v, an acceleration and a jerk the slide needs certain pressures and a certain
-opening; each is linear in the three and follows from the modes, Coulomb friction in their drift
-included.  The three are differences of the coming reference.
+Sliding.  The wanted motion needs certain pressures and a certain opening; see
+:mod:`controllers.motion`.
 
 Stribeck.  Below the Stribeck velocity friction rises above Coulomb's; a share of that rise is
 added to the wanted pressure difference in the direction in which the slide is to move.
@@ -23,10 +22,12 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from controllers.axis import axis_of
+from controllers.motion import PREVIEW, MotionLimits, Sliding, motion, sliding_on
 from controllers.scheduled import Schedule, scheduled
 from controllers.spec import ranged
 from controllers.through_valve import ThroughValve, through_valve
-from linearize.modes import HybridModel, Mode
+from linearize.modes import HybridModel
 from linearize.reduction import closed_command
 from linearize.standard import POSITION, PRESSURES, VELOCITY
 from workbench.effect import Conditions
@@ -34,7 +35,6 @@ from workbench.effects.stribeck_friction import StribeckFriction
 from workbench.parts import Chamber
 
 FAST_M_S = 1e3  # no Stribeck peak there
-PREVIEW = 4  # columns of the reference whose differences are speed, acceleration and jerk
 STATES = (POSITION, VELOCITY, *PRESSURES)
 
 
@@ -77,6 +77,13 @@ class PositioningSpec:
     turn_m_s: float = 0.02
     smooth_v: float = 0.01
 
+    @property
+    def limits(self) -> MotionLimits:
+        """Beyond which the reference has jumped."""
+        return MotionLimits(
+            speed=self.fastest_m_s, acceleration=self.hardest_m_s2, jerk=self.sharpest_m_s3
+        )
+
 
 @dataclass(frozen=True)
 class Memory:
@@ -85,22 +92,6 @@ class Memory:
     integral_m_s: float = 0.0
     resting: bool = False
     plan: Any = None
-
-
-@dataclass(frozen=True)
-class Sliding:
-    """Pressures and opening of a sliding slide on one mode, (p_a, p_b, opening).
-
-    level      at zero speed, shape (3,)
-    slopes     per m/s, m/s2 and m/s3, shape (3, 3)
-    """
-
-    level: np.ndarray
-    slopes: np.ndarray
-
-    def at(self, motion: np.ndarray) -> np.ndarray:
-        """Those of a motion (speed, acceleration, jerk), shape (3,)."""
-        return self.level + self.slopes @ motion
 
 
 @dataclass(frozen=True)
@@ -148,11 +139,11 @@ class Positioning:
     ) -> Task:
         """The task now, from the coming reference, shape (1, PREVIEW) or longer."""
         spec, error_m = self.spec, float(x[0] - reference[0, 0])
-        motion = self._motion(reference[0, :PREVIEW], sample_time_s)
-        speed_m_s = motion[0]
+        wanted = motion(reference[0, :PREVIEW], sample_time_s, spec.limits)
+        speed_m_s = wanted[0]
         wish = (speed_m_s - spec.turn_per_s * error_m) / spec.turn_m_s
         ahead = 0.5 + 0.5 * np.tanh(wish)
-        needed = sum(w * each.at(motion) for w, each in self.sliding.weighted(x[0], ahead))
+        needed = sum(w * each.at(wanted) for w, each in self.sliding.weighted(x[0], ahead))
         rise_n = self._stribeck_n(x[1]) * (2.0 * ahead - 1.0)
         rise_pa = rise_n / (2.0 * self.area_m2)
         near = x[0] - np.clip(error_m, -spec.approach_m, spec.approach_m)
@@ -160,17 +151,6 @@ class Positioning:
         rests = self._rests(memory, error_m, x[1], speed_m_s)
         rate_m = self._rate_m(error_m, x[1])
         return Task(x, target, needed[2], error_m, speed_m_s, ahead, rests, rate_m, rise_n)
-
-    def _motion(self, coming: np.ndarray, sample_time_s: float) -> np.ndarray:
-        """Speed, acceleration and jerk of the reference, shape (3,), none where it jumps."""
-        spec = self.spec
-        steps = np.diff(coming) / sample_time_s
-        if np.abs(steps).max() > spec.fastest_m_s:
-            return np.zeros(3)
-        bends = np.diff(steps) / sample_time_s
-        jerk = (bends[1] - bends[0]) / sample_time_s
-        bend = bends[0] if np.abs(bends).max() <= spec.hardest_m_s2 else 0.0
-        return np.array([steps[0], bend, jerk if abs(jerk) <= spec.sharpest_m_s3 else 0.0])
 
     def _rests(self, memory: Memory, error_m: float, v_m_s: float, speed_m_s: float) -> bool:
         spec = self.spec
@@ -206,37 +186,14 @@ class Positioning:
 
 def positioning(hybrid: HybridModel, spec: PositioningSpec) -> Positioning:
     """The positioning task on the modes of a plant with one valve and two chambers."""
-    plant = hybrid.model.plant
+    plant, axis = hybrid.model.plant, axis_of(hybrid.plant)
     real = hybrid.plant.lean()
     friction = [e for e in plant.effects if isinstance(e, StribeckFriction)]
     centre_v = closed_command(plant)
     return Positioning(
         spec=spec,
         valve=through_valve(real, spec.smooth_v),
-        sliding=scheduled(hybrid, lambda mode: sliding_on(mode, centre_v)),
+        sliding=scheduled(hybrid, lambda mode: sliding_on(mode, axis, centre_v)),
         friction=friction[0] if friction else None,
         area_m2=next(m.area_m2 for m in plant.parts if isinstance(m, Chamber)),
     )
-
-
-def sliding_on(mode: Mode, centre_v: float) -> Sliding:
-    """Pressures p and opening u that go with a motion of the slide, linear in v, dv/dt and d2v/dt2.
-
-    (dv/dt, dp/dt) = drift + A_p (p - p0) + A_v (v - v0) + B (u - u0), solved for p and u, where
-    dp/dt follows from p itself: what p changes with v times dv/dt, and so on.
-    """
-    rows = [mode.state_names.index(name) for name in (VELOCITY, *PRESSURES)]
-    pressures = [mode.state_names.index(name) for name in PRESSURES]
-    v = mode.state_names.index(VELOCITY)
-    size = mode.scale[rows]
-    known = np.column_stack([mode.A[np.ix_(rows, pressures)], mode.B[rows]]) / size[:, None]
-
-    def solved(rates: np.ndarray) -> np.ndarray:
-        return np.linalg.solve(known, rates / size)
-
-    centre = np.array([*mode.state[pressures], mode.command[0] - centre_v])
-    per_speed = solved(-mode.A[rows, v])
-    per_bend = solved(np.array([1.0, *per_speed[:2]]))
-    per_jerk = solved(np.array([0.0, *per_bend[:2]]))
-    level = centre + solved(-mode.drift[rows]) - per_speed * mode.state[v]
-    return Sliding(level, np.column_stack([per_speed, per_bend, per_jerk]))

@@ -9,8 +9,8 @@ from controllers import CONTROLLERS
 from controllers.condensed import MpcSpec
 from controllers.design_file import design, read_design, write_design
 from controllers.linear_mpc import limited_plan, linear_mpc
+from controllers.lq import dlqr
 from controllers.positioning import STATES
-from controllers.state_feedback import dlqr
 from linearize.discrete import sampled
 from linearize.standard import standard_modes
 from workbench.contracts import Estimate
@@ -114,7 +114,7 @@ def test_a_wrong_number_in_a_design_is_an_error_that_names_it():
         design("lq", servo_drive(), {"positon_m": 1e-3})
     with pytest.raises(InputError, match=r"lq\.position_m is 'far'; expected a number above 0"):
         design("lq", servo_drive(), {"position_m": "far"})
-    with pytest.raises(KeyError, match="no controller lqg; there is pid, lq, mpc"):
+    with pytest.raises(KeyError, match="no controller lqg; there is pid, lq, mpc, cascade"):
         design("lqg", servo_drive())
 
 

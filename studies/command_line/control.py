@@ -59,7 +59,7 @@ def modes(
 def design(
     rig: RigFile,
     controller: Annotated[
-        str, typer.Option("--controller", metavar="METHOD", help="pid, lq or mpc.")
+        str, typer.Option("--controller", metavar="METHOD", help="pid, lq, mpc or cascade.")
     ],
     output: Output,
     spec: Annotated[
