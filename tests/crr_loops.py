@@ -1,0 +1,58 @@
+"""Closed loops of the rig and the arm for tests: their sensors, their filter, their references."""
+
+from math import radians
+
+import numpy as np
+
+from controllers.axis import axis_of
+from estimators.ahead import in_time
+from estimators.extended_kalman import ExtendedKalman
+from workbench.closed_loop import Hardware, close_loop
+from workbench.filtering import consistent_start
+
+DT = 1e-3
+POSITION_NOISE = {"crr_rig": 5e-5, "crr_arm": radians(0.05)}
+SPEED_NOISE = {"crr_rig": 0.1, "crr_arm": 1.0}
+PRESSURE_NOISE_PA = 500.0
+
+
+def sensors(plant):
+    """Standard deviations of physics.md section 2."""
+    pressures = dict.fromkeys(plant.measured[1:], PRESSURE_NOISE_PA)
+    return {plant.measured[0]: POSITION_NOISE[plant.name], **pressures}
+
+
+def kalman(plant):
+    """The extended filter of the plant, which foresees the delay of its commands."""
+    axis = axis_of(plant)
+    process = {axis.velocity: SPEED_NOISE[plant.name], **dict.fromkeys(axis.pressures, 1e3)}
+    found = ExtendedKalman(
+        plant=plant,
+        sample_time_s=DT,
+        measurement_noise=sensors(plant),
+        process_noise=process,
+    )
+    return in_time(found, plant)
+
+
+def followed(plant, controller, reference, estimator=None):
+    """The record of a run from rest at the start of the reference, with noise and converter."""
+    name = plant.measured[0]
+    return close_loop(
+        plant,
+        controller,
+        estimator or kalman(plant),
+        {name: reference},
+        initial=consistent_start(plant, {name: reference[0]}),
+        hardware=Hardware(noise=sensors(plant)),
+    )
+
+
+def error_of(record, plant, after=400):
+    """Position less reference, from a sample on."""
+    name = plant.measured[0]
+    return (record.recording[name] - record.recording[f"reference.{name}"])[after:]
+
+
+def rms(error):
+    return float(np.sqrt(np.mean(error**2)))
