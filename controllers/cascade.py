@@ -36,9 +36,7 @@ from linearize.standard import PRESSURES, SUPPLY, VELOCITY
 from workbench.contracts import Command, Estimate
 from workbench.parts import Atmosphere
 
-FINE = PositioningSpec(
-    approach_m=0.012, band_m=2.2e-5, leave_m=5e-5, turn_per_s=120.0, resting_m_s=5e-3
-)
+FINE = PositioningSpec(approach_m=0.012, band_m=2.2e-5, leave_m=5e-5, turn_per_s=200.0)
 """The force loop catches a slide that breaks away: rest can be sought in a narrow band."""
 
 

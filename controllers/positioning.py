@@ -57,8 +57,10 @@ class PositioningSpec:
         How many times faster the integral runs while the slide sticks.
     stribeck_share
         Share of the Stribeck rise that is compensated.
-    turn_per_s, turn_m_s
-        The direction is that of v_r - turn_per_s * error, mixed within ``turn_m_s``.
+    turn_per_s, standing_per_s, turn_m_s
+        The direction is that of v_r - turn_per_s * error, mixed within ``turn_m_s``; while the
+        reference stands with ``standing_per_s``.  Friction changes sides over turn_m_s / turn_per_s
+        of error, which is a stiff spring: too stiff a one swings about a target at rest.
     smooth_v
         Opening over which the jump across the dead zone builds up.
     """
@@ -74,6 +76,7 @@ class PositioningSpec:
     stuck_factor: float = ranged(8.0)
     stribeck_share: float = ranged(0.8, most=1.0)
     turn_per_s: float = 50.0
+    standing_per_s: float = 50.0
     turn_m_s: float = 0.02
     smooth_v: float = 0.01
 
@@ -141,7 +144,8 @@ class Positioning:
         spec, error_m = self.spec, float(x[0] - reference[0, 0])
         wanted = motion(reference[0, :PREVIEW], sample_time_s, spec.limits)
         speed_m_s = wanted[0]
-        wish = (speed_m_s - spec.turn_per_s * error_m) / spec.turn_m_s
+        turn_per_s = spec.turn_per_s if speed_m_s else spec.standing_per_s
+        wish = (speed_m_s - turn_per_s * error_m) / spec.turn_m_s
         ahead = 0.5 + 0.5 * np.tanh(wish)
         needed = sum(w * each.at(wanted) for w, each in self.sliding.weighted(x[0], ahead))
         rise_n = self._stribeck_n(x[1]) * (2.0 * ahead - 1.0)
