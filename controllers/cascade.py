@@ -36,8 +36,17 @@ from linearize.standard import PRESSURES, SUPPLY, VELOCITY
 from workbench.contracts import Command, Estimate
 from workbench.parts import Atmosphere
 
-FINE = PositioningSpec(approach_m=0.012, band_m=2.2e-5, leave_m=5e-5, turn_per_s=200.0)
-"""The force loop catches a slide that breaks away: rest can be sought in a narrow band."""
+FINE = PositioningSpec(
+    approach_m=0.012,
+    band_m=2.2e-5,
+    leave_m=5e-5,
+    stribeck_share=1.0,
+    turn_per_s=100.0,
+    standing_per_s=12.5,
+    turn_m_s=0.005,
+)
+"""The force loop catches a slide that breaks away: rest can be sought in a narrow band, and all of
+the friction can be compensated as soon as the reference turns."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,9 +66,9 @@ class CascadeSpec:
     """
 
     sample_time_s: float = 1e-3
-    bandwidth_hz: float = 12.0
+    bandwidth_hz: float = 14.0
     damping: float = 1.0
-    force_bandwidth_hz: float = 60.0
+    force_bandwidth_hz: float = 70.0
     integral_time_s: float = 0.15
     force_share: float = ranged(0.8, most=1.0, above=True)
     positioning: PositioningSpec = field(default_factory=lambda: FINE)
