@@ -19,7 +19,9 @@ Inequalities in System and Control Theory", SIAM 1994, Ch. 5 (common function).
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import combinations, product
 
@@ -40,8 +42,9 @@ class Certificate:
     modes          that were asked for
     unstable       those whose own loop is unstable: nothing can be certified with them
     common         P of the common function, shape (n, n), None where there is none
+    mixing         whether it holds under every mix of gains too, or with each mode's own law only
     decay_per_s    at which the root of that function shrinks at least
-    breaking       pairs of modes that have no common function of their own
+    breaking       pairs of modes that have no common function under every mix of their gains
     dwell_s        shortest time in a mode that is certified; 0 with a common function, None where
                    nothing is
     """
@@ -49,29 +52,37 @@ class Certificate:
     modes: tuple[str, ...]
     unstable: tuple[str, ...]
     common: np.ndarray | None
+    mixing: bool
     decay_per_s: float
     breaking: tuple[tuple[str, str], ...]
     dwell_s: float | None
 
 
 def certificate(loops: Loops, sample_time_s: float) -> Certificate:
-    """The strongest of both statements that can be proved."""
+    """The strongest statement that can be proved.
+
+    First one function for every mix of gains, then one for each mode's own law, then a dwell time.
+    """
     names = tuple(loops)
     unstable = tuple(name for name in names if _radius(loops[name][0]) >= 1.0)
     if unstable:
-        return Certificate(names, unstable, None, 0.0, (), None)
+        return Certificate(names, unstable, None, False, 0.0, (), None)
     everything = [A for each in loops.values() for A in each]
-    P = common_function(everything)
-    if P is not None:
-        decay = -np.log(max(_growth(A, P, P) for A in everything)) / (2.0 * sample_time_s)
-        return Certificate(names, (), P, float(decay), (), 0.0)
-    pairs = combinations(names, 2)
-    breaking = [
-        pair for pair in pairs if common_function([*loops[pair[0]], *loops[pair[1]]]) is None
-    ]
-    samples = dwell_samples([loops[name][0] for name in names])
+    if (P := common_function(everything)) is not None:
+        decay = _decay_per_s(P, everything, sample_time_s)
+        return Certificate(names, (), P, True, decay, (), 0.0)
+    breaking = tuple(
+        (one, other)
+        for one, other in combinations(names, 2)
+        if common_function([*loops[one], *loops[other]]) is None
+    )
+    own = [loops[name][0] for name in names]
+    if (P := common_function(own)) is not None:
+        decay = _decay_per_s(P, own, sample_time_s)
+        return Certificate(names, (), P, False, decay, breaking, 0.0)
+    samples = dwell_samples(own)
     dwell_s = None if samples is None else samples * sample_time_s
-    return Certificate(names, (), None, 0.0, tuple(breaking), dwell_s)
+    return Certificate(names, (), None, False, 0.0, breaking, dwell_s)
 
 
 def common_function(loops: list[np.ndarray]) -> np.ndarray | None:
@@ -126,13 +137,12 @@ def _dwells(loops: list[np.ndarray], samples: int) -> bool:
 
 
 def _solve(problem) -> None:
-    """Solve, and leave it to the check whether there is an answer."""
+    """Solve, and leave it to the check whether there is an answer, and how good it is."""
     import cvxpy as cp
 
-    try:
+    with warnings.catch_warnings(), suppress(cp.SolverError):
+        warnings.simplefilter("ignore")
         problem.solve(solver=cp.CLARABEL)
-    except cp.SolverError:
-        return
 
 
 def _holds(shrinks: list[tuple[np.ndarray, np.ndarray | None, np.ndarray | None]]) -> bool:
@@ -145,6 +155,11 @@ def _holds(shrinks: list[tuple[np.ndarray, np.ndarray | None, np.ndarray | None]
         and _growth(M, P, Q) < MOST
         for M, P, Q in shrinks
     )
+
+
+def _decay_per_s(P: np.ndarray, loops: list[np.ndarray], sample_time_s: float) -> float:
+    most = max(_growth(A, P, P) for A in loops)
+    return float(-np.log(most) / (2.0 * sample_time_s))
 
 
 def _growth(M: np.ndarray, P: np.ndarray, Q: np.ndarray) -> float:

@@ -50,8 +50,11 @@ def certificate_text(found: Certificate) -> str:
         return f"no certificate across modes: unstable by themselves are {names}"
     if found.common is not None:
         text = f"certified across {modes}: one quadratic Lyapunov function, "
-        text += f"decay {number(found.decay_per_s, 3)} 1/s under any switching and mixing of gains"
-        return f"{text}; {SCOPE}"
+        text += f"decay {number(found.decay_per_s, 3)} 1/s under any switching"
+        if found.mixing:
+            return f"{text} and mixing of gains; {SCOPE}"
+        alone = "each mode with its own gains, but not for every mix of them"
+        return f"{text}, {alone}, {_breaking(found.breaking)}; {SCOPE}"
     text = f"no common quadratic Lyapunov function for {modes}: {_breaking(found.breaking)}"
     if found.dwell_s is None:
         return f"{text}; no dwell time was found either: no certificate across modes"

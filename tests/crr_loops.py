@@ -5,6 +5,7 @@ from math import radians
 import numpy as np
 
 from controllers.axis import axis_of
+from controllers.motion import MotionLimits
 from estimators.ahead import in_time
 from estimators.extended_kalman import ExtendedKalman
 from workbench.closed_loop import Hardware, close_loop
@@ -14,6 +15,16 @@ DT = 1e-3
 POSITION_NOISE = {"crr_rig": 5e-5, "crr_arm": radians(0.05)}
 SPEED_NOISE = {"crr_rig": 0.1, "crr_arm": 1.0}
 PRESSURE_NOISE_PA = 500.0
+PRESSURES = {"cap.pressure_pa": 1e6, "rod_side.pressure_pa": 1e6}
+RIG = {"rod.position_m": 1e-3, "rod.velocity_m_s": 0.1, **PRESSURES, "valve.command_v": 1.0}
+ARM = {
+    "joint.angle_rad": radians(1.0),
+    "joint.velocity_rad_s": 2.0,
+    **PRESSURES,
+    "valve.command_v": 1.0,
+}
+TURNS = {"turn_speed": 0.1, "limits": MotionLimits(speed=8.0, acceleration=100.0, jerk=3e3)}
+"""Weights by signal name, and when a reference of the joint has jumped."""
 
 
 def sensors(plant):

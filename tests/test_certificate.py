@@ -2,11 +2,14 @@
 
 import numpy as np
 import pytest
+from crr_loops import ARM, TURNS
+from cylinder_modes import PLANTS, cylinder_modes
 from scipy.linalg import expm
 
 from controllers import CONTROLLERS
 from controllers.certificate import certificate, common_function, dwell_samples
-from controllers.margins import closed, loops
+from controllers.margins import closed, integral_of, loops, unforeseen_s
+from controllers.regulator import RegulatorSpec, regulator
 from controllers.scheduled import driven_modes
 from linearize.standard import standard_modes
 from studies.design_text import certificate_text
@@ -97,13 +100,34 @@ def test_lq_and_mpc_are_certified_under_any_switching_and_mixing_of_their_modes(
     assert "one quadratic Lyapunov function" in certificate_text(found)
 
 
+def test_gains_that_must_not_be_mixed_are_told_from_switching_that_may_be():
+    """Both modes shrink under their own law; the other law that is mixed in does not in one."""
+    calm, wild = 0.5 * np.eye(2), np.diag([1.2, 0.5])
+    found = certificate({"one": (calm, calm), "other": (0.6 * np.eye(2), wild)}, DT)
+
+    assert found.common is not None and not found.mixing
+    assert found.breaking == (("one", "other"),)
+    said = certificate_text(found)
+    assert "each mode with its own gains" in said and "broken by one with other" in said
+
+
+def test_the_arms_modes_are_certified_with_their_own_gains_behind_its_sensors():
+    """1 ms of the sensors is in the loops."""
+    hybrid = cylinder_modes(PLANTS["crr_arm"]())
+    made = regulator(hybrid, RegulatorSpec(tolerable=ARM, **TURNS))
+    delay_s = unforeseen_s(hybrid.plant)
+    found = certificate(loops(hybrid, made.laws, 1e-3, delay_s), 1e-3)
+
+    assert delay_s == pytest.approx(1e-3)
+    assert found.common is not None and found.unstable == ()
+    assert len(found.common) == 6
+
+
 def test_a_loop_under_mixed_gains_lies_between_the_loops_of_each(hybrid):
     """What is certified of the corners holds inside, since a loop is linear in its law."""
     made = CONTROLLERS["lq"].design(hybrid, CONTROLLERS["lq"].spec())
     mode, laws = driven_modes(hybrid)[0][1], made.laws.forward
     mixed = made.gains.forward
-    from controllers.margins import integral_of
-
     feedback = 0.3 * mixed[1].feedback + 0.7 * mixed[2].feedback
     integral = 0.3 * mixed[1].integral + 0.7 * mixed[2].integral
     between = closed(mode, integral_of(feedback, integral, 2e-3), 2e-3)

@@ -109,6 +109,17 @@ def test_a_design_file_builds_the_same_controller_again(tmp_path, name):
         )
 
 
+def test_a_design_file_of_before_the_later_numbers_still_builds_its_controller(tmp_path):
+    later = ("hardest_m_s2", "sharpest_m_s3", "standing_per_s")
+    path = tmp_path / "design.toml"
+    write_design(design("lq", servo_drive(), {"positioning": {"band_m": 4e-5}}), path)
+    lines = path.read_text(encoding="utf-8").splitlines()
+    path.write_text("\n".join(line for line in lines if not line.startswith(later)) + "\n")
+
+    assert read_design(path).spec.positioning.band_m == 4e-5
+    assert read_design(path).spec.positioning.standing_per_s == 50.0
+
+
 def test_a_wrong_number_in_a_design_is_an_error_that_names_it():
     with pytest.raises(InputError, match=r"lq has no positon_m; .*did you mean 'position_m'\?"):
         design("lq", servo_drive(), {"positon_m": 1e-3})

@@ -5,7 +5,7 @@ from math import pi, radians
 
 import numpy as np
 import pytest
-from crr_loops import DT, error_of, followed, rms
+from crr_loops import ARM, DT, RIG, TURNS, error_of, followed, rms
 from cylinder_modes import PLANTS, cylinder_modes
 
 from controllers.cascade import CascadeSpec, cascade
@@ -24,15 +24,6 @@ from workbench.contracts import Estimate
 from workbench.errors import InputError
 from workbench.plants.servo_drive import servo_drive
 
-PRESSURES = {"cap.pressure_pa": 1e6, "rod_side.pressure_pa": 1e6}
-RIG = {"rod.position_m": 1e-3, "rod.velocity_m_s": 0.1, **PRESSURES, "valve.command_v": 1.0}
-ARM = {
-    "joint.angle_rad": radians(1.0),
-    "joint.velocity_rad_s": 2.0,
-    **PRESSURES,
-    "valve.command_v": 1.0,
-}
-TURNS = {"turn_speed": 0.1, "limits": MotionLimits(speed=8.0, acceleration=100.0, jerk=3e3)}
 NOISE = {"rod.position_m": 5e-5, "cap.pressure_pa": 500.0, "rod_side.pressure_pa": 500.0}
 GROWS = {"rod.velocity_m_s": 0.1, "cap.pressure_pa": 1e3, "rod_side.pressure_pa": 1e3}
 
