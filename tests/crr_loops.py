@@ -13,7 +13,8 @@ from workbench.filtering import consistent_start
 
 DT = 1e-3
 POSITION_NOISE = {"crr_rig": 5e-5, "crr_arm": radians(0.05)}
-SPEED_NOISE = {"crr_rig": 0.1, "crr_arm": 1.0}
+SPEED_NOISE = {"crr_rig": 0.1, "crr_arm": 5.0}
+FLOW_NOISE_PA = {"crr_rig": 1e3, "crr_arm": 2e4}  # less lost the arm in one draw of three
 PRESSURE_NOISE_PA = 500.0
 PRESSURES = {"cap.pressure_pa": 1e6, "rod_side.pressure_pa": 1e6}
 RIG = {"rod.position_m": 1e-3, "rod.velocity_m_s": 0.1, **PRESSURES, "valve.command_v": 1.0}
@@ -36,7 +37,10 @@ def sensors(plant):
 def kalman(plant):
     """The extended filter of the plant, which foresees the delay of its commands."""
     axis = axis_of(plant)
-    process = {axis.velocity: SPEED_NOISE[plant.name], **dict.fromkeys(axis.pressures, 1e3)}
+    process = {
+        axis.velocity: SPEED_NOISE[plant.name],
+        **dict.fromkeys(axis.pressures, FLOW_NOISE_PA[plant.name]),
+    }
     found = ExtendedKalman(
         plant=plant,
         sample_time_s=DT,

@@ -184,9 +184,9 @@ def test_lq_follows_one_hertz_on_the_rig_within_five_per_cent(rig):
 
 
 def test_a_joint_that_is_linearised_by_feedback_follows_one_hertz():
-    """Measured 0.05 degrees with exact parameters, against 0.49 of the scheduled gains."""
+    """Measured 0.10 degrees with exact parameters; faster poles live off the filter's noise."""
     plant = PLANTS["crr_arm"]().lean()
-    made = feedback_linearising(plant, LinearisingSpec(rate_per_s=80.0, sliding_speed=1.0, **TURNS))
+    made = feedback_linearising(plant, LinearisingSpec(rate_per_s=55.0, sliding_speed=1.0, **TURNS))
     reference = radians(56.0) + radians(34.0) * np.sin(2.0 * pi * DT * np.arange(1000) - pi / 2.0)
     error = np.degrees(error_of(followed(plant, made, reference), plant))
 
