@@ -8,8 +8,8 @@ and b the rise of the force per volt and second.  c undoes what the speed takes 
 So the position loop sees a mass behind a lag of 1 / W_f.  The wanted force stays below what supply
 and atmosphere can give, and the integral rests there: that is the cascade's own anti-windup.
 
-Source: named as future work in paper 003; the structure is that of H. Schulte and H. Hahn, Control
-Engineering Practice 12 (2004) 629, with the force in place of the pressures.
+Source: a pressure or force loop inside the position loop is named as future work in paper 003; the
+poles are placed on the modes as in the equations above.
 """
 
 from __future__ import annotations

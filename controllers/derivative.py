@@ -17,7 +17,7 @@ Filter = tuple[np.ndarray, np.ndarray, np.ndarray, float]
 class LowPassDerivative:
     """The difference over one period behind a first-order lag: s / (T_f s + 1).
 
-    Source: K. J. Astrom and T. Hagglund, "Advanced PID Control", ISA 2006, Sec. 3.3, backward
+    Source: K. J. Astrom and T. Hagglund, "Advanced PID Control", ISA 2006, by backward
     differences.
     """
 

@@ -12,8 +12,7 @@ model for j does without, and the acceleration a counts the Coulomb force of the
 
 A comparison for the scheduled designs: no modes, but the model enters with all its errors.
 
-Source: A. Isidori, "Nonlinear Control Systems", 3rd ed., Sec. 4.2; named as future work in papers
-000 and 002.
+Source: A. Isidori, "Nonlinear Control Systems", 3rd ed., Ch. 4; the papers' future work.
 """
 
 from __future__ import annotations

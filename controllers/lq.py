@@ -5,7 +5,7 @@
 on x[k+1] = F x + G u about the mode's point; what the mode drifts is met by the target of its
 states and the opening that go with the wanted motion (:mod:`controllers.motion`).
 
-Source: A. E. Bryson and Y.-C. Ho, "Applied Optimal Control", 1975, Sec. 5.2 (weights).
+Source: A. E. Bryson and Y.-C. Ho, "Applied Optimal Control", 1975 (weights).
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ L(z) = -law(z) (z I - F)^-1 (G_0 z^-n + G_1 z^-(n+1)),   delay = n T + rest
 
 G_0 is what an opening does in the T - rest of a sample that is left when it arrives, G_1 the rest.
 
-Source: K. J. Astrom and B. Wittenmark, "Computer-Controlled Systems", 3rd ed., Sec. 2.6 (delay);
+Source: K. J. Astrom and B. Wittenmark, "Computer-Controlled Systems", 3rd ed., Ch. 2 (delay);
 P. Seiler, A. Packard and P. Gahinet, "An Introduction to Disk Margins", IEEE Control Systems
 Magazine 40 (5) (2020) 78 (disk).
 """

@@ -11,8 +11,8 @@ is unstable or bears too little gain, no PID of that bandwidth is right, and the
 nearest that is.  A lightly damped spring leaves a gap: below it the crossover is slow and needs no
 derivative, above it is fast and lives by it.
 
-Source: K. J. Astrom and T. Hagglund, "Advanced PID Control", ISA 2006, Sec. 6.4 (one point of the
-Nyquist curve); overshoot to phase margin by the second-order loop w^2 / (s (s + 2 z w)).
+Source: K. J. Astrom and T. Hagglund, "Advanced PID Control", ISA 2006 (one point of the Nyquist
+curve); overshoot to phase margin by the second-order loop w^2 / (s (s + 2 z w)).
 """
 
 from __future__ import annotations

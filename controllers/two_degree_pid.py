@@ -11,7 +11,7 @@ The opening of the wanted motion comes from the modes: its part at zero speed is
 and gravity need in that direction (friction compensation), the rest is feedforward of speed,
 acceleration and jerk.  The dead zone is undone in the command.
 
-Source: K. J. Astrom and T. Hagglund, "Advanced PID Control", ISA 2006, Secs. 3.4 to 3.7.
+Source: K. J. Astrom and T. Hagglund, "Advanced PID Control", ISA 2006.
 """
 
 from __future__ import annotations

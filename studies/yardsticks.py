@@ -5,9 +5,8 @@ are drawn from their uncertainty; design and estimator keep the nominal ones, an
 within 20 %.  Errors are of the true position.
 
 Source: Y. Zhu and E. J. Barth, "Accurate sub-millimeter servo-pneumatic tracking using model
-reference adaptive control", Int. J. Fluid Power 11 (2010) 43; G. M. Bone and S. Ning, "Experimental
-comparison of position tracking control algorithms for pneumatic cylinder actuators", IEEE/ASME
-Trans. Mechatronics 12 (2007) 557.
+reference adaptive control", 2010; G. M. Bone and S. Ning, "Experimental comparison of position
+tracking control algorithms for pneumatic cylinder actuators", IEEE/ASME Trans. Mechatronics, 2007.
 """
 
 from __future__ import annotations
