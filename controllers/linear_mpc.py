@@ -21,6 +21,7 @@ import numpy as np
 
 from controllers.condensed import MpcSpec, Program, limits_of, program_of
 from controllers.margins import Law
+from controllers.motion import PREVIEW
 from controllers.positioning import STATES, Memory, Positioning, Task, positioning
 from controllers.scheduled import Schedule, scheduled
 from linearize.modes import HybridModel
@@ -135,4 +136,6 @@ def linear_mpc(hybrid: HybridModel, spec: MpcSpec | None = None) -> LinearMpc:
     limits = limits_of(hybrid.plant, spec)
     sizes = centre_v, task.area_m2, limits, task.valve.openings_v
     programs = scheduled(hybrid, lambda mode: program_of(mode, spec, *sizes).prepared())
-    return LinearMpc(task, programs, spec.sample_time_s, spec.force_n_m_s, spec.horizon + 1)
+    return LinearMpc(
+        task, programs, spec.sample_time_s, spec.force_n_m_s, max(spec.horizon + 1, PREVIEW)
+    )

@@ -1,9 +1,16 @@
-"""How much the loop of each mode bears at the plant's input: gain, phase, delay.
+"""How much the loop of each mode bears at the plant's input: gain, phase, delay, both at once.
 
-The loop is cut at the opening of the valve and taken at the real sample time: the sampled mode and
-the law with its memory, without the limits and without the rest of the positioning task.
+The loop is cut at the opening of the valve and taken at the real sample time and with the real
+delays: the sampled mode, the openings that are under way, and the law with its memory, without the
+limits and without the rest of the positioning task.
 
-L(z) = -law(z) (z I - F)^-1 G
+L(z) = -law(z) (z I - F)^-1 (G_0 z^-n + G_1 z^-(n+1)),   delay = n T + rest
+
+G_0 is what an opening does in the T - rest of a sample that is left when it arrives, G_1 the rest.
+
+Source: K. J. Astrom and B. Wittenmark, "Computer-Controlled Systems", 3rd ed., Ch. 2 (delay);
+P. Seiler, A. Packard and P. Gahinet, "An Introduction to Disk Margins", IEEE Control Systems
+Magazine 40 (5) (2020) 78 (disk).
 """
 
 from __future__ import annotations
@@ -17,6 +24,9 @@ import numpy as np
 from controllers.scheduled import Schedule, driven_modes
 from linearize.discrete import sampled
 from linearize.modes import HybridModel, Mode
+from workbench.effects.timing import SensorDelay
+from workbench.effects.valve_command import CommandDelay
+from workbench.plant import Plant
 
 POINTS = 2000  # frequencies from far below the bandwidth to half the sampling rate
 LOWEST_RAD_S = 0.1
@@ -45,6 +55,7 @@ class Margins:
     phase_rad    lag that may come on top
     delay_s      delay that may come on top
     distance     smallest distance of L from -1, 1/M_s of the textbooks
+    disk         size a of the balanced disk in which gain and phase may vary at once, 2 / |S - T|
     stable       False where the loop is unstable as it is: the rest are crossings, no margins
     """
 
@@ -53,24 +64,72 @@ class Margins:
     phase_rad: float
     delay_s: float
     distance: float
+    disk: float
     stable: bool
 
+    @property
+    def disk_gain(self) -> float:
+        """Factor by which the gain may go up or down, together with the phase; inf for any."""
+        return (2.0 + self.disk) / (2.0 - self.disk) if self.disk < 2.0 else inf
 
-def margins(hybrid: HybridModel, laws: Schedule[Law], sample_time_s: float) -> list[Margins]:
+    @property
+    def disk_phase_rad(self) -> float:
+        """Lag or lead by which the phase may vary, together with the gain."""
+        return 2.0 * float(np.arctan(self.disk / 2.0))
+
+
+def margins(
+    hybrid: HybridModel, laws: Schedule[Law], sample_time_s: float, delay_s: float = 0.0
+) -> list[Margins]:
     """The margins of every driven mode with its own law, forward then backward."""
     pairs = zip(driven_modes(hybrid), (laws.forward, laws.backward), strict=True)
     return [
-        margins_of(mode, law, sample_time_s)
+        margins_of(mode, law, sample_time_s, delay_s)
         for modes, side in pairs
         for mode, law in zip(modes, side, strict=True)
     ]
 
 
-def margins_of(mode: Mode, law: Law, sample_time_s: float) -> Margins:
-    """The margins of one mode."""
+def loops(
+    hybrid: HybridModel, laws: Schedule[Law], sample_time_s: float, delay_s: float = 0.0
+) -> dict[str, tuple[np.ndarray, ...]]:
+    """Closed loops by driven mode: under its own law, then under those that are mixed into it.
+
+    These are the laws of the same place and of both neighbours, for both directions of motion.
+    """
+    sides, found = (laws.forward, laws.backward), {}
+    for own, modes in enumerate(driven_modes(hybrid)):
+        for place, mode in enumerate(modes):
+            near = slice(max(place - 1, 0), place + 2)
+            mixed = [law for side in sides for law in side[near] if law is not sides[own][place]]
+            found[mode.name] = tuple(
+                closed(mode, law, sample_time_s, delay_s) for law in (sides[own][place], *mixed)
+            )
+    return found
+
+
+def closed(mode: Mode, law: Law, sample_time_s: float, delay_s: float = 0.0) -> np.ndarray:
+    """The closed loop x[k+1] = A x[k], shape (n, n), states as in :func:`loop`."""
+    A, B, C = loop(mode, law, sample_time_s, delay_s)
+    return A - B @ C
+
+
+def unforeseen_s(plant: Plant) -> float:
+    """Delay of the sensors: that of the commands is foreseen by an estimator that looks ahead."""
+    return sum(float(e.delay_s) for e in plant.effects if isinstance(e, SensorDelay))
+
+
+def both_ways_s(plant: Plant) -> float:
+    """Delay of commands and sensors together, which a law on the raw measurement meets."""
+    commands = (float(e.delay_s) for e in plant.effects if isinstance(e, CommandDelay))
+    return unforeseen_s(plant) + sum(commands)
+
+
+def margins_of(mode: Mode, law: Law, sample_time_s: float, delay_s: float = 0.0) -> Margins:
+    """The margins of one mode, ``delay_s`` being in the loop already."""
     import control
 
-    A, B, C = loop(mode, law, sample_time_s)
+    A, B, C = loop(mode, law, sample_time_s, delay_s)
     system = control.ss(A, B, C, 0.0, sample_time_s)
     omega = np.geomspace(LOWEST_RAD_S, pi / sample_time_s, POINTS)
     values = system(np.exp(1j * omega * sample_time_s))
@@ -85,17 +144,47 @@ def margins_of(mode: Mode, law: Law, sample_time_s: float) -> Margins:
         phase_rad=_least(min(phase, tau - phase) for phase in phases),
         delay_s=_least(phase / w for phase, w in zip(phases, crossings, strict=True)),
         distance=float(np.abs(1.0 + values).min()),
+        disk=float((2.0 * np.abs(1.0 + values) / np.abs(1.0 - values)).min()),
         stable=bool(np.abs(np.linalg.eigvals(A - B @ C)).max() < 1.0),
     )
 
 
-def loop(mode: Mode, law: Law, sample_time_s: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A, B, C of L, the mode's states in units of their scale before those of the law."""
-    small, n, m = sampled(mode, sample_time_s), len(mode.state_names), len(law.A)
+def loop(
+    mode: Mode, law: Law, sample_time_s: float, delay_s: float = 0.0
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A, B, C of L: the mode's states in units of their scale, those of the law, what is under way.
+
+    What is under way are the openings of the last samples, oldest first.
+    """
+    F, direct, late = _delayed(mode, sample_time_s, delay_s)
+    n, m, kept = len(F), len(law.A), len(late)
     size = mode.scale
-    A = np.block([[small.F * size / size[:, None], np.zeros((n, m))], [law.B * size, law.A]])
-    B = np.concatenate([small.G[:, 0] / size, np.zeros(m)])[:, None]
-    return A, B, -np.concatenate([law.D * size, law.C])[None, :]
+    A = np.zeros((n + m + kept,) * 2)
+    A[:n, :n], A[:n, n + m :] = F, late.T
+    A[n : n + m, :n], A[n : n + m, n : n + m] = law.B * size, law.A
+    A[n + m :, n + m :] = np.eye(kept, k=1)
+    B = np.zeros((n + m + kept, 1))
+    B[:n, 0] = direct
+    if kept:
+        B[-1] = 1.0
+    return A, B, -np.concatenate([law.D * size, law.C, np.zeros(kept)])[None, :]
+
+
+def _delayed(
+    mode: Mode, sample_time_s: float, delay_s: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """F, the effect of this sample's opening, and those of the last ones, oldest first, scaled."""
+    size, whole = mode.scale, sampled(mode, sample_time_s)
+    F, G = whole.F * size / size[:, None], whole.G[:, 0] / size
+    n = int(delay_s / sample_time_s + 1e-9)
+    rest_s = delay_s - n * sample_time_s
+    if rest_s < 1e-9 * sample_time_s:
+        parts = [G]
+    else:
+        arrived = sampled(mode, sample_time_s - rest_s).G[:, 0] / size
+        parts = [G - arrived, arrived]
+    effects = np.array([*parts, *([np.zeros_like(G)] * n)])
+    return F, effects[-1], effects[:-1]
 
 
 def integral_of(feedback: np.ndarray, integral: float, sample_time_s: float) -> Law:

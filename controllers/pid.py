@@ -7,7 +7,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from controllers.margins import Law
-from controllers.positioning import STATES, Memory, Positioning, PositioningSpec, positioning
+from controllers.motion import PREVIEW
+from controllers.positioning import (
+    STATES,
+    Memory,
+    Positioning,
+    PositioningSpec,
+    positioning,
+)
 from controllers.scheduled import Schedule, scheduled
 from controllers.spec import ranged
 from linearize.modes import HybridModel, Mode
@@ -71,7 +78,7 @@ class PidGain:
 
 @dataclass(frozen=True)
 class Pid:
-    """Opening = that of steady sliding - K_p e - K_i integral - K_d (v - v_r), two degrees.
+    """Opening = that of the wanted motion - K_p e - K_i integral - K_d (v - v_r), two degrees.
 
     The derivative acts on the estimated velocity, filtered; a step of the reference does not kick.
     The plan of the memory is the filtered velocity.
@@ -81,7 +88,7 @@ class Pid:
     gains: Schedule[PidGain]
     sample_time_s: float
     filter_s: float
-    preview: int = 2
+    preview: int = PREVIEW
 
     @property
     def laws(self) -> Schedule[Law]:

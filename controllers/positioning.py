@@ -1,7 +1,7 @@
 """What every position controller of a pneumatic slide shares: target, dry friction, rest.
 
-Steady sliding.  At a speed v the slide needs certain pressures and a certain opening; both are
-straight lines in v that follow from the modes, Coulomb friction in their drift included.
+Sliding.  The wanted motion needs certain pressures and a certain opening; see
+:mod:`controllers.motion`.
 
 Stribeck.  Below the Stribeck velocity friction rises above Coulomb's; a share of that rise is
 added to the wanted pressure difference in the direction in which the slide is to move.
@@ -22,10 +22,12 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from controllers.axis import axis_of
+from controllers.motion import PREVIEW, MotionLimits, Sliding, motion, sliding_on
 from controllers.scheduled import Schedule, scheduled
 from controllers.spec import ranged
 from controllers.through_valve import ThroughValve, through_valve
-from linearize.modes import HybridModel, Mode
+from linearize.modes import HybridModel
 from linearize.reduction import closed_command
 from linearize.standard import POSITION, PRESSURES, VELOCITY
 from workbench.effect import Conditions
@@ -44,8 +46,9 @@ class PositioningSpec:
     ----------
     approach_m
         Errors above this count as this, which limits the speed of approach.
-    fastest_m_s
-        A reference that moves faster has jumped, and asks for no speed.
+    fastest_m_s, hardest_m_s2, sharpest_m_s3
+        A reference that moves faster has jumped, and asks for no speed; one that accelerates harder
+        has a corner, and asks for no acceleration; likewise its jerk.
     band_m, leave_m, resting_m_s
         Rest begins inside ``band_m`` below ``resting_m_s`` and ends outside ``leave_m``.
     integrate_m
@@ -54,14 +57,18 @@ class PositioningSpec:
         How many times faster the integral runs while the slide sticks.
     stribeck_share
         Share of the Stribeck rise that is compensated.
-    turn_per_s, turn_m_s
-        The direction is that of v_r - turn_per_s * error, mixed within ``turn_m_s``.
+    turn_per_s, standing_per_s, turn_m_s
+        The direction is that of v_r - turn_per_s * error, mixed within ``turn_m_s``; while the
+        reference stands with ``standing_per_s``.  Friction changes sides over turn_m_s / turn_per_s
+        of error, which is a stiff spring: too stiff a one swings about a target at rest.
     smooth_v
         Opening over which the jump across the dead zone builds up.
     """
 
     approach_m: float = 0.03
     fastest_m_s: float = 2.0
+    hardest_m_s2: float = 30.0
+    sharpest_m_s3: float = 1e3
     band_m: float = ranged(5e-5)
     leave_m: float = ranged(1e-4)
     resting_m_s: float = ranged(5e-3)
@@ -69,8 +76,16 @@ class PositioningSpec:
     stuck_factor: float = ranged(8.0)
     stribeck_share: float = ranged(0.8, most=1.0)
     turn_per_s: float = 50.0
+    standing_per_s: float = 50.0
     turn_m_s: float = 0.02
     smooth_v: float = 0.01
+
+    @property
+    def limits(self) -> MotionLimits:
+        """Beyond which the reference has jumped."""
+        return MotionLimits(
+            speed=self.fastest_m_s, acceleration=self.hardest_m_s2, jerk=self.sharpest_m_s3
+        )
 
 
 @dataclass(frozen=True)
@@ -83,23 +98,12 @@ class Memory:
 
 
 @dataclass(frozen=True)
-class Steady:
-    """Pressures and opening of steady sliding, at zero speed and per m/s, on one mode.
-
-    level, slope       (p_a, p_b, opening), shape (3,)
-    """
-
-    level: np.ndarray
-    slope: np.ndarray
-
-
-@dataclass(frozen=True)
 class Task:
     """One sample of the positioning task.
 
     x             position, velocity and pressures, shape (4,)
     target        where they should be, shape (4,); the position within the approach of x
-    opening_v     of steady sliding at the wanted speed
+    opening_v     of the wanted motion
     error_m       true error, not limited
     ahead         1 forward, 0 backward
     rests         the valve stays shut
@@ -129,30 +133,28 @@ class Positioning:
 
     spec: PositioningSpec
     valve: ThroughValve
-    steady: Schedule[Steady]
+    sliding: Schedule[Sliding]
     friction: StribeckFriction | None
     area_m2: float
 
     def task(
         self, memory: Memory, reference: np.ndarray, x: np.ndarray, sample_time_s: float
     ) -> Task:
-        """The task now, from a reference of at least two columns, shape (1, preview)."""
+        """The task now, from the coming reference, shape (1, PREVIEW) or longer."""
         spec, error_m = self.spec, float(x[0] - reference[0, 0])
-        speed_m_s = (reference[0, 1] - reference[0, 0]) / sample_time_s
-        if abs(speed_m_s) > spec.fastest_m_s:
-            speed_m_s = 0.0
-        wish = (speed_m_s - spec.turn_per_s * error_m) / spec.turn_m_s
+        wanted = motion(reference[0, :PREVIEW], sample_time_s, spec.limits)
+        speed_m_s = wanted[0]
+        turn_per_s = spec.turn_per_s if speed_m_s else spec.standing_per_s
+        wish = (speed_m_s - turn_per_s * error_m) / spec.turn_m_s
         ahead = 0.5 + 0.5 * np.tanh(wish)
-        steady = sum(
-            w * (s.level + s.slope * speed_m_s) for w, s in self.steady.weighted(x[0], ahead)
-        )
+        needed = sum(w * each.at(wanted) for w, each in self.sliding.weighted(x[0], ahead))
         rise_n = self._stribeck_n(x[1]) * (2.0 * ahead - 1.0)
         rise_pa = rise_n / (2.0 * self.area_m2)
         near = x[0] - np.clip(error_m, -spec.approach_m, spec.approach_m)
-        target = np.array([near, speed_m_s, steady[0] + rise_pa, steady[1] - rise_pa])
+        target = np.array([near, speed_m_s, needed[0] + rise_pa, needed[1] - rise_pa])
         rests = self._rests(memory, error_m, x[1], speed_m_s)
         rate_m = self._rate_m(error_m, x[1])
-        return Task(x, target, steady[2], error_m, speed_m_s, ahead, rests, rate_m, rise_n)
+        return Task(x, target, needed[2], error_m, speed_m_s, ahead, rests, rate_m, rise_n)
 
     def _rests(self, memory: Memory, error_m: float, v_m_s: float, speed_m_s: float) -> bool:
         spec = self.spec
@@ -188,30 +190,14 @@ class Positioning:
 
 def positioning(hybrid: HybridModel, spec: PositioningSpec) -> Positioning:
     """The positioning task on the modes of a plant with one valve and two chambers."""
-    plant = hybrid.model.plant
+    plant, axis = hybrid.model.plant, axis_of(hybrid.plant)
     real = hybrid.plant.lean()
     friction = [e for e in plant.effects if isinstance(e, StribeckFriction)]
     centre_v = closed_command(plant)
     return Positioning(
         spec=spec,
         valve=through_valve(real, spec.smooth_v),
-        steady=scheduled(hybrid, lambda mode: steady_sliding(mode, centre_v)),
+        sliding=scheduled(hybrid, lambda mode: sliding_on(mode, axis, centre_v)),
         friction=friction[0] if friction else None,
         area_m2=next(m.area_m2 for m in plant.parts if isinstance(m, Chamber)),
     )
-
-
-def steady_sliding(mode: Mode, centre_v: float) -> Steady:
-    """Where acceleration and pressure rates of a mode vanish, as a line in the velocity.
-
-    0 = drift + A_p (p - p0) + A_v (v - v0) + B (u - u0), solved for p and u.
-    """
-    rows = [mode.state_names.index(name) for name in (VELOCITY, *PRESSURES)]
-    pressures = [mode.state_names.index(name) for name in PRESSURES]
-    v = mode.state_names.index(VELOCITY)
-    known = np.column_stack([mode.A[np.ix_(rows, pressures)], mode.B[rows]])
-    size = mode.scale[rows, None]
-    right = -np.column_stack([mode.drift[rows], mode.A[rows, v]])
-    found = np.linalg.solve(known / size, right / size)
-    at_point = np.array([*mode.state[pressures], mode.command[0] - centre_v]) + found[:, 0]
-    return Steady(at_point - found[:, 1] * mode.state[v], found[:, 1])

@@ -12,10 +12,10 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
+from controllers.axis import axis_of
 from linearize.analysis import require_controllable
 from linearize.modes import HybridModel, Mode
 from linearize.reduction import closed_command
-from linearize.standard import COMMAND, POSITION, VELOCITY
 
 Design = TypeVar("Design")
 Other = TypeVar("Other")
@@ -57,15 +57,25 @@ class Schedule(Generic[Design]):
         return max(self.weighted(position_m, ahead), key=lambda pair: pair[0])[1]
 
 
+def constant(design: Design) -> Schedule[Design]:
+    """One design everywhere."""
+    return Schedule(np.zeros(1), (design,), (design,))
+
+
 def driven_modes(hybrid: HybridModel) -> tuple[list[Mode], list[Mode]]:
-    """Modes whose valve drives the motion, forward and backward, by rising position."""
-    sides = ([], [])
+    """Modes whose valve drives the motion, forward and backward, by rising position.
+
+    Where the command is not cut, that is every mode in which the axis moves.
+    """
+    axis, sides = axis_of(hybrid.plant), ([], [])
     for mode in hybrid.modes:
-        speed = mode.box[VELOCITY].point
-        drive = mode.box[COMMAND].point - closed_command(hybrid.plant)
+        speed = mode.box[axis.velocity].point
+        drive = speed
+        if axis.command in mode.box:
+            drive = mode.box[axis.command].point - closed_command(hybrid.plant)
         if speed * drive > 0.0:
             sides[speed < 0.0].append(mode)
-    return tuple(sorted(side, key=lambda mode: mode.box[POSITION].point) for side in sides)
+    return tuple(sorted(side, key=lambda mode: mode.box[axis.position].point) for side in sides)
 
 
 def scheduled(hybrid: HybridModel, design: Callable[[Mode], Design]) -> Schedule[Design]:
@@ -79,5 +89,6 @@ def scheduled(hybrid: HybridModel, design: Callable[[Mode], Design]) -> Schedule
     forward, backward = driven_modes(hybrid)
     for mode in (*forward, *backward):
         require_controllable(mode)
-    points = np.array([mode.box[POSITION].point for mode in forward])
+    place = axis_of(hybrid.plant).position
+    points = np.array([mode.box[place].point for mode in forward])
     return Schedule(points, tuple(map(design, forward)), tuple(map(design, backward)))

@@ -5,14 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.linalg import solve_discrete_are
 
+from controllers.lq import Gain, lq_gain
 from controllers.margins import Law, integral_of
-from controllers.positioning import STATES, Memory, Positioning, PositioningSpec, positioning
+from controllers.motion import PREVIEW
+from controllers.positioning import (
+    STATES,
+    Memory,
+    Positioning,
+    PositioningSpec,
+    positioning,
+)
 from controllers.scheduled import Schedule, scheduled
-from linearize.discrete import sampled
-from linearize.modes import HybridModel, Mode
-from linearize.standard import POSITION, PRESSURES, VELOCITY
+from linearize.modes import HybridModel
+from linearize.standard import COMMAND, POSITION, PRESSURES, VELOCITY
 from workbench.contracts import Command, Estimate
 
 
@@ -31,24 +37,17 @@ class LqSpec:
     integral_time_s: float = 0.1
     positioning: PositioningSpec = field(default_factory=PositioningSpec)
 
-
-@dataclass(frozen=True)
-class Gain:
-    """Feedback of (position, velocity, pressure a, pressure b) and of the integral of the error.
-
-    feedback      K in V per unit of state, shape (4,)
-    integral      K_i in V/(m s)
-    poles         of the closed loop with integral, on the plane of s, 1/s, shape (5,)
-    """
-
-    feedback: np.ndarray
-    integral: float
-    poles: np.ndarray
+    @property
+    def tolerable(self) -> dict[str, float]:
+        """The weights by signal name."""
+        pressures = dict.fromkeys(PRESSURES, self.pressure_pa)
+        own = {POSITION: self.position_m, VELOCITY: self.velocity_m_s, COMMAND: self.opening_v}
+        return own | pressures
 
 
 @dataclass(frozen=True)
 class StateFeedback:
-    """Opening = that of steady sliding - K (x - target) - K_i integral, one gain per mode, mixed.
+    """Opening = that of the motion - K (x - target) - K_i integral, one gain per mode, mixed.
 
     The integral rests while the opening is at its limit, so that it cannot wind up.
     """
@@ -56,7 +55,7 @@ class StateFeedback:
     task: Positioning
     gains: Schedule[Gain]
     sample_time_s: float
-    preview: int = 2
+    preview: int = PREVIEW
 
     @property
     def laws(self) -> Schedule[Law]:
@@ -94,41 +93,6 @@ def lq_state_feedback(hybrid: HybridModel, spec: LqSpec | None = None) -> StateF
         If a mode cannot be stabilised.
     """
     spec = spec or LqSpec()
-    gains = scheduled(hybrid, lambda mode: lq_gain(mode, spec))
+    weighed = (spec.tolerable, spec.integral_time_s, spec.sample_time_s)
+    gains = scheduled(hybrid, lambda mode: lq_gain(mode, *weighed))
     return StateFeedback(positioning(hybrid, spec.positioning), gains, spec.sample_time_s)
-
-
-def weights(spec: LqSpec) -> tuple[np.ndarray, np.ndarray]:
-    """Q of (state, integral), shape (5, 5), and R, shape (1, 1), in SI units."""
-    tolerable = {
-        POSITION: spec.position_m,
-        VELOCITY: spec.velocity_m_s,
-        **dict.fromkeys(PRESSURES, spec.pressure_pa),
-    }
-    state = [tolerable[name] ** -2.0 for name in STATES]
-    integral = (spec.position_m * spec.integral_time_s) ** -2.0
-    return np.diag([*state, integral]), np.array([[spec.opening_v**-2.0]])
-
-
-def lq_gain(mode: Mode, spec: LqSpec) -> Gain:
-    """Gain of one sampled mode, extended by the integral of the position error."""
-    small, n, dt = sampled(mode, spec.sample_time_s), len(mode.state_names), spec.sample_time_s
-    F, G = np.eye(n + 1), np.zeros((n + 1, 1))
-    F[:n, :n], F[n, mode.state_names.index(POSITION)], G[:n] = small.F, dt, small.G
-    Q, R = weights(spec)
-    try:
-        K = dlqr(F, G, Q, R, np.array([*mode.scale, mode.scale[0]]))
-    except np.linalg.LinAlgError as error:
-        raise ValueError(f"mode {mode.name!r} cannot be stabilised by its command") from error
-    poles = np.log(np.linalg.eigvals(F - G @ K).astype(complex)) / dt
-    return Gain(K[0, :n], float(K[0, n]), poles)
-
-
-def dlqr(
-    F: np.ndarray, G: np.ndarray, Q: np.ndarray, R: np.ndarray, scale: np.ndarray
-) -> np.ndarray:
-    """K of u = -K x that minimises the sum of x'Qx + u'Ru, shape (n_u, n_x); solved scaled."""
-    F, G = F * scale / scale[:, None], G / scale[:, None]
-    Q = Q * np.outer(scale, scale)
-    X = solve_discrete_are(F, G, Q, R)
-    return np.linalg.solve(R + G.T @ X @ G, G.T @ X @ F) / scale

@@ -9,31 +9,76 @@ from typing import TYPE_CHECKING
 from studies.text import columns, number
 
 if TYPE_CHECKING:
+    from controllers.certificate import Certificate
     from controllers.margins import Margins
 
-HEAD = ("mode", "gain down to", "gain up to", "phase deg", "delay ms", "distance", "loop")
-NO_CERTIFICATE = (
-    "no certificate across modes: none is made; the margins hold inside each mode, for the sampled "
-    "loop without limits"
+HEAD = (
+    "mode",
+    "gain down to",
+    "gain up to",
+    "phase deg",
+    "delay ms",
+    "distance",
+    "disk x",
+    "disk deg",
+    "loop",
 )
 UNSTABLE = (
     "unstable: an oscillation grows in the sampled loop of that mode, where dry friction is a "
     "constant and takes no energy; `workbench check` says what the whole plant makes of it"
 )
+SCOPE = (
+    "for the sampled loops without limits; while the valve is shut or brakes, nothing is claimed"
+)
+MOST_PAIRS = 6  # that are named
 
 
-def margins_text(found: Iterable[Margins]) -> str:
-    """One line per mode; a dash where the loop has no such margin."""
+def margins_text(found: Iterable[Margins], delay_s: float = 0.0) -> str:
+    """One line per mode, a dash where the loop has no such margin, and what delay is in them."""
     found = [*found]
     lines = [columns(HEAD, [_row(each) for each in found])]
+    lines += [f"with {1e3 * delay_s:g} ms of the sensors in the loop"] if delay_s else []
     lines += [] if all(each.stable for each in found) else [UNSTABLE]
-    return "\n".join([*lines, NO_CERTIFICATE])
+    return "\n".join(lines)
+
+
+def certificate_text(found: Certificate) -> str:
+    """What is certified across modes, for which, and which pairs break it."""
+    modes = f"the {len(found.modes)} modes above"
+    if found.unstable:
+        names = ", ".join(found.unstable)
+        return f"no certificate across modes: unstable by themselves are {names}"
+    if found.common is not None:
+        text = f"certified across {modes}: one quadratic Lyapunov function, "
+        text += f"decay {number(found.decay_per_s, 3)} 1/s under any switching"
+        if found.mixing:
+            return f"{text} and mixing of gains; {SCOPE}"
+        alone = "each mode with its own gains, but not for every mix of them"
+        return f"{text}, {alone}, {_breaking(found.breaking)}; {SCOPE}"
+    text = f"no common quadratic Lyapunov function for {modes}: {_breaking(found.breaking)}"
+    if found.dwell_s is None:
+        return f"{text}; no dwell time was found either: no certificate across modes"
+    dwell = f"certified is a dwell time of {number(1e3 * found.dwell_s, 3)} ms in each mode"
+    return f"{text}; {dwell}, each with its own gains, {SCOPE}"
+
+
+def _breaking(pairs: tuple[tuple[str, str], ...]) -> str:
+    if not pairs:
+        return "each pair has one, all together have none"
+    named = "; ".join(f"{one} with {other}" for one, other in pairs[:MOST_PAIRS])
+    more = len(pairs) - MOST_PAIRS
+    return f"broken by {named}" + (f" and {more} more" if more > 0 else "")
 
 
 def _row(each: Margins) -> tuple[str, ...]:
     if not each.stable:
-        return (each.mode, *["-"] * 5, "unstable")
+        return (each.mode, *["-"] * (len(HEAD) - 2), "unstable")
     low, high = each.gain
+    ends = (number(low, 3), _end(high))
     numbers = (degrees(each.phase_rad), 1e3 * each.delay_s, each.distance)
-    ends = (number(low, 3), "any" if isinf(high) else number(high, 3))
-    return (each.mode, *ends, *(number(value, 3) for value in numbers), "stable")
+    disk = (_end(each.disk_gain), number(degrees(each.disk_phase_rad), 3))
+    return (each.mode, *ends, *(number(value, 3) for value in numbers), *disk, "stable")
+
+
+def _end(factor: float) -> str:
+    return "any" if isinf(factor) else number(factor, 3)

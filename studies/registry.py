@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
-from studies import hidden_study, identification_study, mode_placement, shift_study
+from studies import (
+    controllers_study,
+    hidden_study,
+    identification_study,
+    mode_placement,
+    shift_study,
+)
 from studies.study import Study
 
 STUDIES: dict[str, Study] = {
     study.name: study
     for study in (
+        controllers_study.STUDY,
         hidden_study.STUDY,
         identification_study.STUDY,
         mode_placement.STUDY,

@@ -9,8 +9,8 @@ from controllers import CONTROLLERS
 from controllers.condensed import MpcSpec
 from controllers.design_file import design, read_design, write_design
 from controllers.linear_mpc import limited_plan, linear_mpc
+from controllers.lq import dlqr
 from controllers.positioning import STATES
-from controllers.state_feedback import dlqr
 from linearize.discrete import sampled
 from linearize.standard import standard_modes
 from workbench.contracts import Estimate
@@ -109,12 +109,23 @@ def test_a_design_file_builds_the_same_controller_again(tmp_path, name):
         )
 
 
+def test_a_design_file_of_before_the_later_numbers_still_builds_its_controller(tmp_path):
+    later = ("hardest_m_s2", "sharpest_m_s3", "standing_per_s")
+    path = tmp_path / "design.toml"
+    write_design(design("lq", servo_drive(), {"positioning": {"band_m": 4e-5}}), path)
+    lines = path.read_text(encoding="utf-8").splitlines()
+    path.write_text("\n".join(line for line in lines if not line.startswith(later)) + "\n")
+
+    assert read_design(path).spec.positioning.band_m == 4e-5
+    assert read_design(path).spec.positioning.standing_per_s == 50.0
+
+
 def test_a_wrong_number_in_a_design_is_an_error_that_names_it():
     with pytest.raises(InputError, match=r"lq has no positon_m; .*did you mean 'position_m'\?"):
         design("lq", servo_drive(), {"positon_m": 1e-3})
     with pytest.raises(InputError, match=r"lq\.position_m is 'far'; expected a number above 0"):
         design("lq", servo_drive(), {"position_m": "far"})
-    with pytest.raises(KeyError, match="no controller lqg; there is pid, lq, mpc"):
+    with pytest.raises(KeyError, match="no controller lqg; there is pid, lq, mpc, cascade"):
         design("lqg", servo_drive())
 
 

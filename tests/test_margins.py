@@ -8,7 +8,14 @@ import pytest
 from commands import call
 
 from controllers import CONTROLLERS
-from controllers.margins import Law, loop, margins, margins_of
+from controllers.margins import (
+    Law,
+    both_ways_s,
+    loop,
+    margins,
+    margins_of,
+    unforeseen_s,
+)
 from controllers.positioning import STATES
 from controllers.scheduled import driven_modes
 from linearize.discrete import sampled
@@ -55,12 +62,50 @@ def test_a_sampled_integrator_has_the_margins_of_the_textbook(hybrid):
     assert found.delay_s == pytest.approx((pi / 2.0 - turn / 2.0) / (turn / DT), rel=1e-4)
 
 
+@pytest.mark.parametrize("delay_s", [DT, 1.4 * DT, 3.0 * DT])
+def test_a_delay_in_the_loop_takes_what_it_takes_from_the_phase(hybrid, delay_s):
+    """L = K T / (z - 1) with u late by n T + r is K (T - r + r / z) / (z - 1) / z^n."""
+    K, w = 40.0, np.geomspace(1.0, 1000.0, 50)
+    A, B, C = loop(integrator(hybrid), proportional(K), DT, delay_s)
+    n, z = int(delay_s / DT + 1e-9), np.exp(1j * w * DT)
+    r = delay_s - n * DT
+    expected = K * (DT - r + r / z) / (z - 1.0) / z**n
+    got = [(C @ np.linalg.solve(each * np.eye(len(A)) - A, B))[0, 0] for each in z]
+
+    assert np.allclose(got, expected)
+    late, early = (
+        margins_of(integrator(hybrid), proportional(K), DT, d).phase_rad for d in (delay_s, 0.0)
+    )
+    assert early - late == pytest.approx(K * delay_s, rel=0.02)
+
+
+def test_the_delay_of_a_network_is_that_of_both_ways():
+    from workbench.plants.crr_rig import crr_rig
+
+    assert unforeseen_s(crr_rig()) == pytest.approx(1e-3)
+    assert both_ways_s(crr_rig()) == pytest.approx(2e-3)
+
+
+def test_disk_margins_are_those_of_python_control(hybrid):
+    import control
+
+    K = 100.0
+    found = margins_of(integrator(hybrid), proportional(K), DT)
+    known = control.ss(1.0, DT, K, 0.0, DT)
+    omega = np.geomspace(0.1, pi / DT * 0.999, 4000)
+    size, gain_db, phase_deg = control.disk_margins(known, omega)
+
+    assert found.disk == pytest.approx(size, rel=1e-3)
+    assert found.disk_phase_rad == pytest.approx(np.radians(phase_deg), rel=1e-3)
+    assert 20.0 * np.log10(found.disk_gain) == pytest.approx(gain_db, rel=1e-3)
+
+
 def test_a_loop_beyond_its_gain_margin_is_called_unstable(hybrid):
     found = margins_of(integrator(hybrid), proportional(1001.0), DT)
 
     assert not found.stable
     said = margins_text([found]).splitlines()
-    assert said[1].split()[-6:] == ["-"] * 5 + ["unstable"]
+    assert said[1].split()[-8:] == ["-"] * 7 + ["unstable"]
     assert said[2].startswith("unstable: ")
 
 
@@ -126,7 +171,7 @@ def test_the_loop_of_a_mode_is_the_sampled_mode_behind_its_law(hybrid):
 
 
 @everyone
-def test_design_prints_margins_of_every_mode_and_that_nothing_is_certified(tmp_path, name):
+def test_design_prints_margins_of_every_mode_and_what_is_certified_across_them(tmp_path, name):
     rig = tmp_path / "rig.toml"
     rig.write_text('plant = "servo_drive"\n')
 
@@ -137,4 +182,6 @@ def test_design_prints_margins_of_every_mode_and_that_nothing_is_certified(tmp_p
     head = next(k for k, line in enumerate(lines) if line.startswith("mode "))
     assert all(word in lines[head] for word in ("gain up to", "phase deg", "delay ms", "distance"))
     assert len({line.split("  ")[0] for line in lines[head + 1 : head + 7]}) == 6
-    assert "no certificate across modes" in answer.stdout
+    certified = "one quadratic Lyapunov function" in answer.stdout
+    assert certified == (name != "pid")
+    assert certified != ("no certificate across modes: unstable" in answer.stdout)

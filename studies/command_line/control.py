@@ -85,7 +85,7 @@ def modes(
 def design(
     rig: RigFile,
     controller: Annotated[
-        str, typer.Option("--controller", metavar="METHOD", help="pid, lq or mpc.")
+        str, typer.Option("--controller", metavar="METHOD", help="pid, lq, mpc or cascade.")
     ],
     output: Output,
     spec: Annotated[
@@ -95,11 +95,12 @@ def design(
 ) -> None:
     """One design per mode, written as a file that `check` reads."""
     with answering(quiet) as say:
+        from controllers.certificate import certificate
         from controllers.design_file import design as design_controller
         from controllers.design_file import gains, write_design
-        from controllers.margins import margins
+        from controllers.margins import loops, margins, unforeseen_s
         from studies.catalogue_text import read_toml
-        from studies.design_text import margins_text
+        from studies.design_text import certificate_text, margins_text
         from workbench.rig import load_rig
 
         writable(output)
@@ -111,7 +112,11 @@ def design(
         for name, gain in gains(found.controller):
             typer.echo(f"{name}: {gain}")
         made = found.controller
-        typer.echo(margins_text(margins(found.hybrid, made.laws, made.sample_time_s)))
+        delay_s = unforeseen_s(found.plant)
+        loop = (found.hybrid, made.laws, made.sample_time_s, delay_s)
+        typer.echo(margins_text(margins(*loop), delay_s))
+        say("looking for a certificate across modes")
+        typer.echo(certificate_text(certificate(loops(*loop), made.sample_time_s)))
         typer.echo(f"wrote {output}")
 
 

@@ -1,0 +1,106 @@
+"""Linear-quadratic gains of one sampled mode: Bryson's weights by signal name, integral action.
+
+    min   sum |x_i / tolerable_i|^2 + (u / tolerable)^2 + (integral / (tolerable position T_i))^2
+
+on x[k+1] = F x + G u about the mode's point; what the mode drifts is met by the target of its
+states and the opening that go with the wanted motion (:mod:`controllers.motion`).
+
+Source: A. E. Bryson and Y.-C. Ho, "Applied Optimal Control", 1975 (weights).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import solve_discrete_are
+
+from linearize.discrete import sampled
+from linearize.modes import Mode
+from workbench.errors import InputError, Message, listed, nearest
+
+
+@dataclass(frozen=True)
+class Gain:
+    """Feedback of (position, velocity, pressure a, pressure b) and of the integral of the error.
+
+    feedback      K in V per unit of state, shape (4,)
+    integral      K_i in V/(m s)
+    poles         of the closed loop with integral, on the plane of s, 1/s, shape (5,)
+    """
+
+    feedback: np.ndarray
+    integral: float
+    poles: np.ndarray
+
+
+def lq_gain(
+    mode: Mode, tolerable: Mapping[str, float], integral_time_s: float, sample_time_s: float
+) -> Gain:
+    """The gain of one mode, its first state being the position.
+
+    Parameters
+    ----------
+    tolerable
+        Deviation by name of a state or the command, each worth a cost of one; a state that is not
+        named costs nothing, the position and the command must be.
+
+    Raises
+    ------
+    InputError
+        If a name is none of the mode's, or the position or the command has no weight.
+    ValueError
+        If the mode cannot be stabilised.
+    """
+    _require_weights(mode, tolerable)
+    position = mode.state_names[0]
+    costs = [tolerable[name] ** -2.0 if name in tolerable else 0.0 for name in mode.state_names]
+    Q = np.diag([*costs, (tolerable[position] * integral_time_s) ** -2.0])
+    R = np.array([[tolerable[mode.command_names[0]] ** -2.0]])
+    F, G = with_integral(mode, sample_time_s)
+    try:
+        K = dlqr(F, G, Q, R, np.array([*mode.scale, mode.scale[0]]))
+    except np.linalg.LinAlgError as error:
+        raise ValueError(f"mode {mode.name!r} cannot be stabilised by its command") from error
+    return gain_of(F, G, K[0], sample_time_s)
+
+
+def with_integral(mode: Mode, sample_time_s: float) -> tuple[np.ndarray, np.ndarray]:
+    """F and G of a sampled mode, extended by the integral of its first state."""
+    small, n = sampled(mode, sample_time_s), len(mode.state_names)
+    F, G = np.eye(n + 1), np.zeros((n + 1, 1))
+    F[:n, :n], F[n, 0], G[:n] = small.F, sample_time_s, small.G
+    return F, G
+
+
+def gain_of(F: np.ndarray, G: np.ndarray, K: np.ndarray, sample_time_s: float) -> Gain:
+    """A state feedback K of (state, integral), shape (n + 1,), with the poles that it gives."""
+    poles = np.log(np.linalg.eigvals(F - G @ K[None, :]).astype(complex)) / sample_time_s
+    return Gain(K[:-1], float(K[-1]), poles)
+
+
+def dlqr(
+    F: np.ndarray, G: np.ndarray, Q: np.ndarray, R: np.ndarray, scale: np.ndarray
+) -> np.ndarray:
+    """K of u = -K x that minimises the sum of x'Qx + u'Ru, shape (n_u, n_x); solved scaled."""
+    F, G = F * scale / scale[:, None], G / scale[:, None]
+    Q = Q * np.outer(scale, scale)
+    X = solve_discrete_are(F, G, Q, R)
+    return np.linalg.solve(R + G.T @ X @ G, G.T @ X @ F) / scale
+
+
+def _require_weights(mode: Mode, tolerable: Mapping[str, float]) -> None:
+    known = (*mode.state_names, *mode.command_names)
+    wrong = [
+        Message("no such signal to weigh", name, listed(known), nearest(name, known))
+        for name in tolerable
+        if name not in known
+    ]
+    wrong += [
+        Message("has no tolerable deviation", name, "one above 0")
+        for name in (mode.state_names[0], mode.command_names[0])
+        if name not in tolerable
+    ]
+    if wrong:
+        raise InputError(*wrong)

@@ -1,0 +1,197 @@
+"""Gains of a PID on one mode from a specification: bandwidth, phase margin, overshoot.
+
+At the wanted crossover w the loop is to have |L| = 1 and the phase -180 deg + margin.  With K_i
+tied to K_p by the integral time these are two linear equations for K_p and K_d,
+
+    K_p (1 + I(w) / T_i) + K_d H(w) = exp(j (margin - pi)) / G(w)
+
+where G is the sampled mode with its delays, I the summation and H the derivative filter as they are
+run.  Where they ask for a negative K_d the phase suffices without, and K_d is zero.  Where the loop
+is unstable or bears too little gain, no PID of that bandwidth is right, and the answer names the
+nearest that is.  A lightly damped spring leaves a gap: below it the crossover is slow and needs no
+derivative, above it is fast and lives by it.
+
+Source: K. J. Astrom and T. Hagglund, "Advanced PID Control", ISA 2006 (one point of the Nyquist
+curve); overshoot to phase margin by the second-order loop w^2 / (s (s + 2 z w)).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import atan, log, pi, radians, sqrt, tau
+
+import numpy as np
+
+from controllers.axis import axis_of
+from controllers.derivative import Derivative, LowPassDerivative
+from controllers.margins import Law, Margins, both_ways_s, closed, loop, margins_of
+from controllers.motion import MotionLimits, sliding_on
+from controllers.scheduled import Schedule, constant, scheduled
+from controllers.spec import ranged
+from controllers.through_valve import through_valve
+from controllers.two_degree_pid import Dither, Feedforward, PidGains, TwoDegreePid, law_of
+from linearize.modes import HybridModel, Mode
+from linearize.reduction import closed_command
+from workbench.errors import InputError, Message
+
+LOWEST_HZ, HIGHEST_HZ, TRIED = 0.1, 50.0, 40  # where another bandwidth is looked for
+
+
+@dataclass(frozen=True, kw_only=True)
+class TuningSpec:
+    """What a loop is to do on every mode.
+
+    Attributes
+    ----------
+    bandwidth_hz
+        Where the loop's gain crosses one.
+    phase_margin_rad, overshoot
+        At least this margin, and as much as keeps a second-order loop from overshooting more.
+    gain_margin
+        Factor that the gain must bear upwards.
+    integral_periods
+        T_i = integral_periods / w.
+    """
+
+    bandwidth_hz: float = 2.0
+    phase_margin_rad: float = ranged(radians(50.0), most=pi / 2.0)
+    overshoot: float = ranged(0.15, most=1.0)
+    gain_margin: float = ranged(1.8, least=1.0)
+    integral_periods: float = 8.0
+
+    @property
+    def margin_rad(self) -> float:
+        """The larger of both demands on the phase."""
+        return max(self.phase_margin_rad, margin_of_overshoot(self.overshoot))
+
+
+@dataclass(frozen=True, kw_only=True)
+class PidParts:
+    """All of a PID besides its gains."""
+
+    derivative: Derivative = LowPassDerivative(3e-3)
+    setpoint: float = 1.0
+    setpoint_rate: float = 0.0
+    feedforward_share: float = 0.0
+    turn_speed: float = 0.02
+    turn_per_s: float = 5.0
+    limits: MotionLimits = MotionLimits()
+    dither: Dither = Dither()
+    tracking_time_s: float = 0.05
+    smooth_v: float = 0.01
+    sample_time_s: float = 1e-3
+
+
+PAPER_GAINS = {
+    "crr_rig": PidGains(proportional=250.0, integral=200.0, derivative=8.0, setpoint_rate=1.0),
+    "crr_arm": PidGains(proportional=4.0, integral=4.0, derivative=0.4, setpoint_rate=1.0),
+}
+"""Those under which papers 000 and 001 are reproduced; *chosen*, none are printed (physics.md)."""
+
+
+def margin_of_overshoot(overshoot: float) -> float:
+    """Phase margin in rad of the second-order loop that overshoots by this share of a step."""
+    if overshoot <= 0.0:
+        return atan(2.0 / sqrt(sqrt(5.0) - 2.0))  # damping 1
+    if overshoot >= 1.0:
+        return 0.0
+    z = -log(overshoot) / sqrt(pi**2 + log(overshoot) ** 2)
+    return atan(2.0 * z / sqrt(sqrt(1.0 + 4.0 * z**4) - 2.0 * z**2))
+
+
+def tuned_pid(
+    hybrid: HybridModel, spec: TuningSpec | None = None, parts: PidParts | None = None
+) -> TwoDegreePid:
+    """A PID with the gains of each mode from one specification, at the plant's own delays.
+
+    Raises
+    ------
+    InputError
+        If a mode does not allow the bandwidth, with the nearest that it allows.
+    """
+    spec, parts = spec or TuningSpec(), parts or PidParts()
+    delay_s = both_ways_s(hybrid.plant)
+    gains = scheduled(hybrid, lambda mode: tuned_gains(mode, spec, parts, delay_s))
+    return pid_with(hybrid, gains, parts)
+
+
+def pid_with(
+    hybrid: HybridModel, gains: Schedule[PidGains] | PidGains, parts: PidParts | None = None
+) -> TwoDegreePid:
+    """A PID with known gains: those of the papers, or those of each mode."""
+    parts, axis = parts or PidParts(), axis_of(hybrid.plant)
+    centre_v = closed_command(hybrid.plant)
+    ahead = Feedforward(
+        sliding=scheduled(hybrid, lambda mode: sliding_on(mode, axis, centre_v)),
+        share=parts.feedforward_share,
+        turn_speed=parts.turn_speed,
+        turn_per_s=parts.turn_per_s,
+        limits=parts.limits,
+    )
+    return TwoDegreePid(
+        signal=axis.position,
+        gains=constant(gains) if isinstance(gains, PidGains) else gains,
+        valve=through_valve(hybrid.plant.lean(), parts.smooth_v),
+        feedforward=ahead,
+        derivative=parts.derivative,
+        dither=parts.dither,
+        tracking_time_s=parts.tracking_time_s,
+        sample_time_s=parts.sample_time_s,
+    )
+
+
+def tuned_gains(mode: Mode, spec: TuningSpec, parts: PidParts, delay_s: float) -> PidGains:
+    """The gains of one mode.
+
+    Raises
+    ------
+    InputError
+        If it does not allow the bandwidth.
+    """
+    found = _at_bandwidth(mode, spec, parts, delay_s, spec.bandwidth_hz)
+    if found is not None:
+        return found
+    tried = np.geomspace(LOWEST_HZ, HIGHEST_HZ, TRIED)
+    tried = tried[np.argsort(abs(np.log(tried / spec.bandwidth_hz)))]
+    reached = (hz for hz in tried if _at_bandwidth(mode, spec, parts, delay_s, hz) is not None)
+    nearest = next(reached, None)
+    what = f"no PID crosses at {spec.bandwidth_hz:g} Hz with a phase margin of "
+    what += f"{np.degrees(spec.margin_rad):.0f} deg and a gain margin of {spec.gain_margin:g}"
+    expected = "smaller margins" if nearest is None else f"for example {nearest:.2g} Hz"
+    raise InputError(Message(what, f"mode '{mode.name}'", expected))
+
+
+def pid_margins(mode: Mode, gains: PidGains, parts: PidParts, delay_s: float) -> Margins:
+    """The margins of known gains on a mode, with the delays in the loop."""
+    law = law_of(gains, parts.derivative.filter(parts.sample_time_s), parts.sample_time_s)
+    return margins_of(mode, law, parts.sample_time_s, delay_s)
+
+
+def _at_bandwidth(
+    mode: Mode, spec: TuningSpec, parts: PidParts, delay_s: float, bandwidth_hz: float
+) -> PidGains | None:
+    w, dt = tau * bandwidth_hz, parts.sample_time_s
+    z, integral_time_s = np.exp(1j * w * dt), spec.integral_periods / w
+    A, B, C, D = parts.derivative.filter(dt)
+    slope = C @ np.linalg.solve(z * np.eye(len(A)) - A, B) + D
+    summed = 1.0 + dt * z / (z - 1.0) / integral_time_s
+    wanted = np.exp(1j * (spec.margin_rad - pi)) / _plant_at(mode, z, dt, delay_s)
+    both = np.array([[summed.real, slope.real], [summed.imag, slope.imag]])
+    kp, kd = np.linalg.solve(both, [wanted.real, wanted.imag])
+    if kd < 0.0:
+        kp, kd = abs(wanted) / abs(summed), 0.0
+    shares = {"setpoint": parts.setpoint, "setpoint_rate": parts.setpoint_rate}
+    gains = PidGains(proportional=kp, integral=kp / integral_time_s, derivative=kd, **shares)
+    law = law_of(gains, (A, B, C, D), dt)
+    if kp < 0.0 or np.abs(np.linalg.eigvals(closed(mode, law, dt, delay_s))).max() >= 1.0:
+        return None
+    found = margins_of(mode, law, dt, delay_s)
+    right = found.gain[1] >= spec.gain_margin
+    return gains if right and found.phase_rad >= 0.99 * spec.margin_rad else None
+
+
+def _plant_at(mode: Mode, z: complex, sample_time_s: float, delay_s: float) -> complex:
+    """From the opening to the position, at one point of the plane of z."""
+    seen = Law(np.zeros((0, 0)), np.zeros((0, 4)), np.zeros(0), np.array([-1.0, 0.0, 0.0, 0.0]))
+    A, B, C = loop(mode, seen, sample_time_s, delay_s)
+    return complex((C @ np.linalg.solve(z * np.eye(len(A)) - A, B))[0, 0])

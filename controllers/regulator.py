@@ -1,0 +1,112 @@
+"""Scheduled LQ control of one axis, whatever its units: one gain per mode, mixed between them.
+
+    opening = opening of the wanted motion - K (x - target) - K_i integral
+
+Target and opening follow from the affine modes, so gravity, dry friction and the pressures that an
+acceleration needs stand in them.  With an estimator that is a Kalman filter this is LQG.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from controllers.axis import Axis, axis_of
+from controllers.lq import Gain, lq_gain
+from controllers.margins import Law, integral_of
+from controllers.motion import PREVIEW, MotionLimits, Sliding, motion, sliding_on
+from controllers.scheduled import Schedule, scheduled
+from controllers.through_valve import ThroughValve, through_valve
+from linearize.modes import HybridModel
+from linearize.reduction import closed_command
+from workbench.contracts import Command, Estimate
+
+
+@dataclass(frozen=True, kw_only=True)
+class RegulatorSpec:
+    """Weights and clock of a scheduled LQ design.
+
+    Attributes
+    ----------
+    tolerable
+        Deviation by signal name, each worth a cost of one (Bryson's rule).
+    integral_time_s
+        Time over which a constant tolerable error of the position costs one.
+    turn_speed, turn_per_s
+        The direction is that of speed + turn_per_s * error, mixed within ``turn_speed``.
+    smooth_v
+        Opening over which the jump across a dead zone builds up.
+    """
+
+    tolerable: Mapping[str, float]
+    integral_time_s: float = 0.3
+    sample_time_s: float = 1e-3
+    turn_speed: float = 0.02
+    turn_per_s: float = 20.0
+    smooth_v: float = 0.01
+    limits: MotionLimits = field(default_factory=MotionLimits)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Regulator:
+    """See the module.  Its memory is the integral, which rests while the valve is at a limit."""
+
+    axis: Axis
+    spec: RegulatorSpec
+    gains: Schedule[Gain]
+    sliding: Schedule[Sliding]
+    valve: ThroughValve
+    preview: int = PREVIEW
+
+    @property
+    def sample_time_s(self) -> float:
+        return self.spec.sample_time_s
+
+    @property
+    def laws(self) -> Schedule[Law]:
+        """What it does while no limit is met."""
+        dt = self.sample_time_s
+        return self.gains.mapped(lambda gain: integral_of(gain.feedback, gain.integral, dt))
+
+    def start(self) -> Command:
+        return Command(self.valve.shut, 0.0)
+
+    def step(self, last: Command, reference: np.ndarray, estimate: Estimate) -> Command:
+        spec, x = self.spec, estimate.pick(self.axis.states)
+        wanted = motion(reference[0, :PREVIEW], spec.sample_time_s, spec.limits)
+        error = float(x[0] - reference[0, 0])
+        ahead = 0.5 + 0.5 * np.tanh((wanted[0] - spec.turn_per_s * error) / spec.turn_speed)
+        needed = sum(w * each.at(wanted) for w, each in self.sliding.weighted(x[0], ahead))
+        target = np.array([reference[0, 0], wanted[0], *needed[:2]])
+        integral = last.memory + spec.sample_time_s * error
+        here = [*self.gains.weighted(x[0], ahead)]
+        opening_v = needed[2] - sum(
+            w * (gain.feedback @ (x - target) + gain.integral * integral) for w, gain in here
+        )
+        limited_v = float(np.clip(opening_v, *self.valve.openings_v))
+        kept = integral if limited_v == opening_v else last.memory
+        notes = {"opening_v": limited_v, "integral": kept}
+        return Command(self.valve.sent(limited_v, estimate), kept, notes)
+
+
+def regulator(hybrid: HybridModel, spec: RegulatorSpec) -> Regulator:
+    """LQ designs on every mode in which the valve drives the motion.
+
+    Raises
+    ------
+    InputError
+        If a weight is for a signal that the modes do not have, or one is missing.
+    ValueError
+        If a mode cannot be stabilised.
+    """
+    axis, centre_v = axis_of(hybrid.plant), closed_command(hybrid.plant)
+    weighed = (spec.tolerable, spec.integral_time_s, spec.sample_time_s)
+    return Regulator(
+        axis=axis,
+        spec=spec,
+        gains=scheduled(hybrid, lambda mode: lq_gain(mode, *weighed)),
+        sliding=scheduled(hybrid, lambda mode: sliding_on(mode, axis, centre_v)),
+        valve=through_valve(hybrid.plant.lean(), spec.smooth_v),
+    )

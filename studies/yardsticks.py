@@ -1,0 +1,115 @@
+"""Published results that a position controller of the servo drive is measured against.
+
+Each is run on the whole plant with its stiction, noise and 12-bit command.  The plant's parameters
+are drawn from their uncertainty; design and estimator keep the nominal ones, and know the payload
+within 20 %.  Errors are of the true position.
+
+Source: Y. Zhu and E. J. Barth, "Accurate sub-millimeter servo-pneumatic tracking using model
+reference adaptive control", 2010; G. M. Bone and S. Ning, "Experimental comparison of position
+tracking control algorithms for pneumatic cylinder actuators", IEEE/ASME Trans. Mechatronics, 2007.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from controllers.design_file import design
+from linearize.standard import POSITION, stroke_m
+from studies.checking import drawn
+from studies.closed_loop_check import run, standard_estimator
+from studies.closed_loop_metrics import measure
+from studies.scenarios import SAMPLE_TIME_S, Scenario
+from workbench.plant import Plant
+from workbench.plants.servo_drive import servo_drive
+from workbench.rig import Rig, default_rig
+
+MASS = "slide.mass_kg"
+PAYLOADS_KG = (2.2, 5.8, 10.0)
+KNOWN_WITHIN = 0.2
+CYCLE_M = 0.1e-3  # motion at rest that counts as a limit cycle
+
+FINAL, CYCLE, RISE, HALF, ONE, LARGE = (
+    "60 mm step: final error (mm)",
+    "60 mm step: motion at rest (mm)",
+    "60 mm step: rise (ms)",
+    "60 mm at 0.5 Hz: largest error (mm)",
+    "60 mm at 1 Hz: largest error (mm)",
+    "70 mm at 0.5 Hz: RMSE (mm)",
+)
+LIMITS = {FINAL: 0.05, CYCLE: 1e3 * CYCLE_M, RISE: 200.0, HALF: 0.7, ONE: 1.2, LARGE: 0.4}
+"""Zhu and Barth, but for the motion at rest (no limit cycle) and the last, Bone and Ning's."""
+
+
+@dataclass(frozen=True)
+class Draw:
+    """The plant that moves, and what design and estimator take it for."""
+
+    payload_kg: float
+    number: int
+    plant: Plant
+    believed: Plant
+
+
+def draws(number: int, payloads_kg: tuple[float, ...] = PAYLOADS_KG) -> Iterator[Draw]:
+    """The same draws at every call; those of one number differ in nothing but the payload."""
+    rig = default_rig(servo_drive())
+    for k in range(number):
+        rng = np.random.default_rng(k + 1)
+        factor = rng.uniform(1.0 - KNOWN_WITHIN, 1.0 + KNOWN_WITHIN)
+        found = drawn(_weighed(rig), rng)
+        for kg in payloads_kg:
+            believed = rig.plant.with_values({MASS: kg * factor})
+            yield Draw(kg, k, found.with_values({MASS: kg}), believed)
+
+
+def _weighed(rig: Rig) -> Rig:
+    """The rig whose mass is not drawn, since the payload says it."""
+    return replace(rig, fixed=rig.fixed | {MASS})
+
+
+def step(plant: Plant) -> Scenario:
+    """60 mm after 0.1 s, watched for 1.5 s."""
+    time_s = SAMPLE_TIME_S * np.arange(1600)
+    start_m = stroke_m(plant) / 2.0 - 0.03
+    return Scenario("step", start_m + 0.06 * (time_s >= 0.1), 0.1, 0.1)
+
+
+def sine(plant: Plant, frequency_hz: float, amplitude_m: float) -> Scenario:
+    """Two periods about the middle, judged in the second."""
+    n = round(2.0 / frequency_hz / SAMPLE_TIME_S)
+    swing = np.sin(2.0 * np.pi * frequency_hz * SAMPLE_TIME_S * np.arange(n))
+    middle_m = stroke_m(plant) / 2.0
+    return Scenario("sine", middle_m + amplitude_m * swing, 0.0, 1.0 / frequency_hz)
+
+
+def measured(draw: Draw, method: str, numbers: Mapping[str, Any]) -> dict[str, float]:
+    """Every yardstick's number by its name; NaN where the loop does not stay finite.
+
+    ``numbers`` are those of the design that differ from the method's own.
+    """
+    controller = design(method, draw.believed, numbers).controller
+    estimator = standard_estimator("ekf", draw.believed, controller.sample_time_s)
+    truth, found = draw.plant.lean(), {}
+
+    def record(scenario: Scenario):
+        return run(truth, controller, estimator, scenario, draw.number)
+
+    def errors_m(scenario: Scenario) -> np.ndarray:
+        moved = record(scenario).recording[POSITION] - scenario.reference_m
+        return moved[round(scenario.judged_s / SAMPLE_TIME_S) :]
+
+    try:
+        stepped = step(truth)
+        one = measure(truth, record(stepped), stepped, method, "ekf")
+        found |= {FINAL: 1e3 * one.final_error_m, CYCLE: 1e3 * one.limit_cycle_m}
+        found |= {RISE: 1e3 * one.rise_s}
+        found[HALF] = 1e3 * float(abs(errors_m(sine(truth, 0.5, 0.06))).max())
+        found[ONE] = 1e3 * float(abs(errors_m(sine(truth, 1.0, 0.06))).max())
+        found[LARGE] = 1e3 * float(np.sqrt(np.mean(errors_m(sine(truth, 0.5, 0.07)) ** 2)))
+    except ArithmeticError:
+        return dict.fromkeys(LIMITS, float("nan"))
+    return found

@@ -1,0 +1,136 @@
+"""Stability across modes: textbook pairs of loops, and the loops of the designs."""
+
+import numpy as np
+import pytest
+from crr_loops import ARM, TURNS
+from cylinder_modes import PLANTS, cylinder_modes
+from scipy.linalg import expm
+
+from controllers import CONTROLLERS
+from controllers.certificate import certificate, common_function, dwell_samples
+from controllers.margins import closed, integral_of, loops, unforeseen_s
+from controllers.regulator import RegulatorSpec, regulator
+from controllers.scheduled import driven_modes
+from linearize.standard import standard_modes
+from studies.design_text import certificate_text
+from workbench.plants.servo_drive import servo_drive
+
+DT = 0.01
+ROUND, FLAT = np.array([[-0.1, 1.0], [-10.0, -0.1]]), np.array([[-0.1, 10.0], [-1.0, -0.1]])
+"""Two slow spirals whose switching diverges: Branicky 1998, IEEE Trans. Autom. Control 43, 475."""
+
+
+def spirals():
+    return expm(ROUND * DT), expm(FLAT * DT)
+
+
+@pytest.fixture(scope="module")
+def hybrid():
+    return standard_modes(servo_drive())
+
+
+def test_loops_that_commute_have_a_common_function_that_shrinks_in_each():
+    """Narendra and Balakrishnan 1994: stable matrices that commute share a Lyapunov function."""
+    one = np.array([[0.9, 0.2], [0.0, 0.8]])
+    both = [one, one @ one + 0.05 * np.eye(2)]
+    found = certificate({"one": (both[0],), "other": (both[1],)}, DT)
+
+    assert found.dwell_s == 0.0 and found.breaking == ()
+    assert np.linalg.eigvalsh(found.common)[0] > 0.0
+    for A in both:
+        shrunk = found.common - A.T @ found.common @ A
+        assert np.linalg.eigvalsh(shrunk)[0] > 0.0
+    x, kept = np.array([1.0, -2.0]), np.exp(-2.0 * found.decay_per_s * DT)
+    assert (both[0] @ x) @ found.common @ (both[0] @ x) <= 1.0001 * kept * x @ found.common @ x
+
+
+def test_two_spirals_break_it_and_need_a_dwell_time():
+    one, other = spirals()
+    found = certificate({"round": (one,), "flat": (other,)}, DT)
+
+    assert found.common is None and found.decay_per_s == 0.0
+    assert found.breaking == (("round", "flat"),)
+    assert found.dwell_s > 1.0
+    said = certificate_text(found)
+    assert "broken by round with flat" in said and "dwell time of" in said
+
+
+def test_no_switching_that_keeps_the_dwell_time_grows():
+    one, other = spirals()
+    samples = dwell_samples([one, other])
+    turn = np.linalg.matrix_power(one, samples) @ np.linalg.matrix_power(other, samples)
+
+    assert np.abs(np.linalg.eigvals(turn)).max() < 1.0
+    fast = max(
+        np.abs(
+            np.linalg.eigvals(np.linalg.matrix_power(one, n) @ np.linalg.matrix_power(other, n))
+        ).max()
+        for n in range(1, 100)
+    )
+    assert fast > 1.0
+
+
+def test_the_function_of_one_loop_is_found_by_scipy_too():
+    from scipy.linalg import solve_discrete_lyapunov
+
+    A = spirals()[0]
+    found = common_function([A])
+
+    assert np.linalg.eigvalsh(solve_discrete_lyapunov(A.T, np.eye(2)))[0] > 0.0
+    assert np.linalg.eigvalsh(found - A.T @ found @ A)[0] > 0.0
+
+
+def test_with_an_unstable_mode_nothing_is_certified_and_it_is_named():
+    found = certificate({"calm": (0.5 * np.eye(2),), "wild": (1.01 * np.eye(2),)}, DT)
+
+    assert found.unstable == ("wild",) and found.common is None and found.dwell_s is None
+    assert certificate_text(found) == (
+        "no certificate across modes: unstable by themselves are wild"
+    )
+
+
+@pytest.mark.parametrize("name", ["lq", "mpc"])
+def test_lq_and_mpc_are_certified_under_any_switching_and_mixing_of_their_modes(hybrid, name):
+    method = CONTROLLERS[name]
+    made = method.design(hybrid, method.spec())
+    found = certificate(loops(hybrid, made.laws, made.sample_time_s), made.sample_time_s)
+
+    assert found.common is not None and len(found.modes) == 6
+    assert found.decay_per_s > 0.05
+    assert "one quadratic Lyapunov function" in certificate_text(found)
+
+
+def test_gains_that_must_not_be_mixed_are_told_from_switching_that_may_be():
+    """Both modes shrink under their own law; the other law that is mixed in does not in one."""
+    calm, wild = 0.5 * np.eye(2), np.diag([1.2, 0.5])
+    found = certificate({"one": (calm, calm), "other": (0.6 * np.eye(2), wild)}, DT)
+
+    assert found.common is not None and not found.mixing
+    assert found.breaking == (("one", "other"),)
+    said = certificate_text(found)
+    assert "each mode with its own gains" in said and "broken by one with other" in said
+
+
+def test_the_arms_modes_are_certified_with_their_own_gains_behind_its_sensors():
+    """1 ms of the sensors is in the loops."""
+    hybrid = cylinder_modes(PLANTS["crr_arm"]())
+    made = regulator(hybrid, RegulatorSpec(tolerable=ARM, **TURNS))
+    delay_s = unforeseen_s(hybrid.plant)
+    found = certificate(loops(hybrid, made.laws, 1e-3, delay_s), 1e-3)
+
+    assert delay_s == pytest.approx(1e-3)
+    assert found.common is not None and found.unstable == ()
+    assert len(found.common) == 6
+
+
+def test_a_loop_under_mixed_gains_lies_between_the_loops_of_each(hybrid):
+    """What is certified of the corners holds inside, since a loop is linear in its law."""
+    made = CONTROLLERS["lq"].design(hybrid, CONTROLLERS["lq"].spec())
+    mode, laws = driven_modes(hybrid)[0][1], made.laws.forward
+    mixed = made.gains.forward
+    feedback = 0.3 * mixed[1].feedback + 0.7 * mixed[2].feedback
+    integral = 0.3 * mixed[1].integral + 0.7 * mixed[2].integral
+    between = closed(mode, integral_of(feedback, integral, 2e-3), 2e-3)
+    corners = [closed(mode, laws[k], 2e-3) for k in (1, 2)]
+
+    assert np.allclose(between, 0.3 * corners[0] + 0.7 * corners[1])

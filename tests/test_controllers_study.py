@@ -1,0 +1,75 @@
+"""The study of the controllers: its draws, and what it claims of numbers that are given."""
+
+import numpy as np
+import pytest
+
+from studies.controllers_study import DESIGNS, outcome
+from studies.yardsticks import FINAL, HALF, KNOWN_WITHIN, LIMITS, MASS, PAYLOADS_KG, draws, sine
+
+BEST = next(iter(DESIGNS))
+
+
+def rows(share=0.5, **other):
+    """Three draws of every design and payload at a share of every limit, unless told otherwise."""
+    found = {mark: share * limit for mark, limit in LIMITS.items()} | other
+    return {(name, kg): [dict(found) for _ in range(3)] for name in DESIGNS for kg in PAYLOADS_KG}
+
+
+def held(found):
+    return {claim.claim: claim.holds for claim in found.claims}
+
+
+def test_designs_within_every_limit_hold_every_claim_and_beyond_none():
+    assert all(held(outcome(rows())).values())
+    beyond = held(outcome(rows(share=1.2)))
+
+    assert [holds for claim, holds in beyond.items() if "at most" in claim] == [False] * len(LIMITS)
+
+
+def test_the_median_counts_against_the_limit_and_the_spread_against_twice_it():
+    one_bad, one_far = rows(), rows()
+    one_bad[BEST, 5.8][0][FINAL] = 1.9 * LIMITS[FINAL]
+    one_far[BEST, 5.8][0][FINAL] = 2.1 * LIMITS[FINAL]
+
+    assert all(held(outcome(one_bad)).values())
+    assert [claim for claim, holds in held(outcome(one_far)).items() if not holds] == [
+        f"{BEST}, every payload, {FINAL}: 0.05 at most"
+    ]
+
+
+def test_a_draw_that_is_lost_is_named_and_the_figure_is_drawn_without_it():
+    lost = rows()
+    lost[BEST, 10.0][2] = dict.fromkeys(LIMITS)
+    found = outcome(lost)
+    claim = found.claims[-1]
+
+    assert not claim.holds and claim.found == "cascade with 10 kg, draw 3"
+    assert list(found.figures) == ["yardsticks"]
+    assert len(found.figures["yardsticks"].axes) == len(LIMITS)
+
+
+def test_an_error_of_another_design_breaks_no_claim():
+    others = rows()
+    others["pid", 2.2][0][HALF] = 100.0
+
+    assert all(held(outcome(others)).values())
+
+
+def test_draws_repeat_and_know_the_payload_within_a_fifth():
+    first, again = ([*draws(4)] for _ in range(2))
+    known = np.array([each.believed.values[MASS] / each.payload_kg for each in first])
+
+    assert [each.plant.values for each in first] == [each.plant.values for each in again]
+    assert all(each.plant.values[MASS] == each.payload_kg for each in first)
+    assert abs(known - 1.0).max() < KNOWN_WITHIN
+    assert np.ptp(known) > 0.05
+    valves = {each.plant.values["valve.flow_area_m2"] for each in first}
+    assert len(valves) == 4
+
+
+def test_a_sine_is_judged_in_its_second_period():
+    plant = next(draws(1)).plant
+    scenario = sine(plant, 0.5, 0.06)
+
+    assert scenario.judged_s == pytest.approx(2.0) and len(scenario.reference_m) == 4000
+    assert np.ptp(scenario.reference_m) == pytest.approx(0.12, rel=1e-3)
