@@ -168,19 +168,6 @@ def valve_cut(points: ShiftPoints) -> dict[str, tuple[Level, ...]]:
     }
 
 
-def _at_room_temperature(plant: Plant) -> Placing:
-    """Each cut signal at its point, vented, with the gas at the temperature of the supply."""
-    thin = shift_model(plant)
-
-    def placed(model: DesignModel, box: Box) -> OperatingPoint:
-        at = {name: region.point for name, region in box.items()}
-        x = [at.get(n, v) for n, v in zip(thin.states, thin.initial, strict=True)]
-        whole = dict(zip(thin.plant.model.states, thin.full(x).full().ravel(), strict=True))
-        return operating_point(model, {name: float(whole[name]) for name in MASSES} | at)
-
-    return placed
-
-
 def side_cut(model: DesignModel, pieces: int = 1) -> tuple[Interval, ...]:
     """Low and High side, each in so many pieces over which a volume changes by the same ratio.
 

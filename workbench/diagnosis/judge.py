@@ -24,7 +24,7 @@ import numpy as np
 
 from workbench.candidate import Candidate
 from workbench.diagnosis.refit import Refit
-from workbench.diagnosis.result import Ranked
+from workbench.diagnosis.result import Law, Ranked
 from workbench.diagnosis.scan import Profile
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.window_length import moves
@@ -61,7 +61,7 @@ def reasons_against(base: Fit, refit: Refit, parameters: int = 0) -> tuple[str, 
     if not predicts(refit):
         against.append(HELD_OUT_REASON)
     each = len(refit.candidate.singles)
-    if _share(refit) < each * LEAST_SHARE or refit.drop_train < each * LEAST_TRAINING:
+    if share_removed(refit) < each * LEAST_SHARE or refit.drop_train < each * LEAST_TRAINING:
         against.append(SHARE_REASON if each == 1 else f"{SHARE_REASON} each")
     return (*against, *_size_reasons(refit))
 
@@ -92,11 +92,11 @@ def too_few(held_out: Fit | None) -> bool:
     return len(held_out.windows) < FEWEST_WINDOWS
 
 
-def _share(refit: Refit) -> float:
+def share_removed(found: Refit | Law) -> float:
     """Share of the misfit that goes away, mean of training and held-out."""
-    if isnan(refit.drop_validation):
-        return refit.drop_train
-    return (refit.drop_train + refit.drop_validation) / 2
+    if isnan(found.drop_validation):
+        return found.drop_train
+    return (found.drop_train + found.drop_validation) / 2
 
 
 def _bic_gain(base: Fit, fit: Fit, parameters: int) -> float:

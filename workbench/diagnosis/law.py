@@ -13,10 +13,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from math import isnan
 
 from workbench.candidate import Candidate
-from workbench.diagnosis.judge import CLEARLY_LESS, reasons_against
+from workbench.diagnosis.judge import CLEARLY_LESS, reasons_against, share_removed
 from workbench.diagnosis.law_choice import worth_scanning
 from workbench.diagnosis.law_seed import refitted, seeds
 from workbench.diagnosis.refit import Refit, held_out_drop, refit
@@ -54,13 +53,8 @@ def empirical_law(
     other = _at_once(problem, terms, where)
     if law is None or other is None:
         return law or other
-    return other if _left(other) < (1.0 - CLEARLY_LESS) * _left(law) else law
-
-
-def _left(law: Law) -> float:
-    """Share of the misfit that a law leaves, as the mean over training and held-out recordings."""
-    held_out = law.drop_train if isnan(law.drop_validation) else law.drop_validation
-    return 1.0 - (law.drop_train + held_out) / 2.0
+    left, left_by_law = (1.0 - share_removed(each) for each in (other, law))
+    return other if left < (1.0 - CLEARLY_LESS) * left_by_law else law
 
 
 def _at_once(problem: Problem, terms: Sequence[Candidate], where: Where | None) -> Law | None:

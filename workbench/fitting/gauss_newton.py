@@ -104,9 +104,7 @@ def fit_windows(
     for _ in range(iterations):
         if stale or at is None:
             at, fresh = linearise(windows, unknowns, now.point, now.residual), True
-        found = _stepped(windows, unknowns, at, now)
-        fall = (now.cost - found.cost) / max(now.cost, 1e-12)
-        now = min(now, found, key=lambda each: each.cost)
+        now, fall = _advanced(windows, unknowns, at, now)
         converged = fall < CONVERGED
         if converged and fresh:
             break
@@ -128,14 +126,21 @@ def follow(
     """
     now = start
     for _ in range(iterations):
-        found = _stepped(windows, unknowns, at, now)
-        fall = (now.cost - found.cost) / max(now.cost, 1e-12)
-        now = min(now, found, key=lambda each: each.cost)
+        now, fall = _advanced(windows, unknowns, at, now)
         if fall < AGAIN:
             break
         at = secant(windows, at, now.point, now.residual)
     at = seen_at(windows, at, now.point, now.residual)
     return Fit(windows, unknowns, now.point, now.chi2, now.cost, False, at)
+
+
+def _advanced(
+    windows: Windows, unknowns: Unknowns, at: Linearised, now: Cost
+) -> tuple[Cost, float]:
+    """Where a step leads, or where it began if that costs less; and its relative fall."""
+    found = _stepped(windows, unknowns, at, now)
+    fall = (now.cost - found.cost) / max(now.cost, 1e-12)
+    return min(now, found, key=lambda each: each.cost), fall
 
 
 def _stepped(windows: Windows, unknowns: Unknowns, at: Linearised, now: Cost) -> Cost:
