@@ -9,7 +9,6 @@ from test_report import diagnosis
 
 from workbench.diagnosis.law_seed import seeds
 from workbench.diagnosis.missing_term import Course
-from workbench.fitting.unknowns import nominal_unknowns
 from workbench.plants import PLANTS
 from workbench.rig_laws import is_law, law_terms, with_laws
 
@@ -44,8 +43,8 @@ def read_off(force_n):
     fed = (np.tile(values[:, None], SAMPLES) for values in (u, d))
     course = Course("slide.velocity_m_s", "missing@slide.momentum.flow", x, *fed)
     noise = np.random.default_rng(5).standard_normal(SAMPLES)
-    where = replace(diagnosis().where, term=force_n + noise, course=course)
-    return seeds(WHOLE, nominal_unknowns(PLAIN.lean()), where, TERMS, 3)
+    where = replace(diagnosis().where, rest=force_n + noise, course=course)
+    return seeds(WHOLE, where, TERMS, 3)
 
 
 def test_the_terms_come_one_by_one_with_their_sizes():

@@ -62,8 +62,7 @@ def _at_once(problem: Problem, terms: Sequence[Candidate], where: Where | None) 
     best: Law | None = None
     before = problem.base, problem.base_validation
     steps: list[LawTerm] = []
-    read_off = seeds(problem.whole, problem.base.unknowns, where, terms, MOST_TERMS)
-    for count, seed in enumerate(read_off, start=1):
+    for count, seed in enumerate(seeds(problem.whole, where, terms, MOST_TERMS), start=1):
         found = refitted(problem, seed)
         fit, held_out = (steps[-1].fit, steps[-1].validation) if steps else before
         drops = (fit.cost - found.fit.cost) / misfit(fit), held_out_drop(held_out, found.validation)

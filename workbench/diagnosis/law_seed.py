@@ -17,12 +17,11 @@ from dataclasses import replace
 import numpy as np
 
 from workbench.candidate import Candidate
-from workbench.diagnosis.dependence import balance_columns, imitated, parameter_columns
+from workbench.diagnosis.dependence import balance_columns
 from workbench.diagnosis.refit import Refit, refit_from
 from workbench.diagnosis.result import Where
 from workbench.diagnosis.suspects import with_missing_flows
 from workbench.fitting.problem import Problem
-from workbench.fitting.unknowns import Unknowns
 from workbench.plant import Plant
 from workbench.rig_laws import laws_of
 
@@ -32,20 +31,17 @@ LEAST_MORE = 0.03  # of it, by another term
 Seed = tuple[tuple[Candidate, ...], Mapping[str, float]]  # terms, and their sizes by full name
 
 
-def seeds(
-    whole: Plant, unknowns: Unknowns, where: Where | None, terms: Sequence[Candidate], most: int
-) -> list[Seed]:
+def seeds(whole: Plant, where: Where | None, terms: Sequence[Candidate], most: int) -> list[Seed]:
     """Laws of one term, of two and so on up to ``most``, each beginning with the one before.
 
     None where the terms cannot explain half of what the smoother found missing beyond what the
-    ``unknowns`` imitate.  ``whole`` is the plant with the terms in their places, absent.
+    nominal parameters imitate.  ``whole`` is the plant with the terms in their places, absent.
     """
-    course = where and where.course
-    if not course or not terms:
+    if where is None or where.rest is None or where.course is None or not terms:
         return []
     plant, _ = with_missing_flows(whole.lean(keep=[law.name for law in laws_of(whole)]))
-    rest = where.term - imitated(where.term, parameter_columns(plant, unknowns, course))
-    columns = balance_columns(plant, [term.strength for term in terms], course)
+    rest = where.rest
+    columns = balance_columns(plant, [term.strength for term in terms], where.course)
     found, chosen, left = [], [], float(rest @ rest)
     for _ in range(most):
         trials = {k: _regressed(rest, columns[:, [*chosen, k]]) for k in _new(columns, chosen)}

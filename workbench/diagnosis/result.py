@@ -142,8 +142,8 @@ class Where:
     imitated
         Share of the term's variance that the nominal parameters explain within their priors; it
         is left out in ``against``.
-    course
-        What the smoother ran through.
+    rest, course
+        The term without that share, shape (n,), and what the smoother ran through.
     """
 
     balance: str
@@ -156,6 +156,7 @@ class Where:
     by_regime: Mapping[str, float]
     intensities: Intensities | None = None
     imitated: float = 0.0
+    rest: np.ndarray | None = field(default=None, repr=False)
     course: Course | None = field(default=None, repr=False)
 
     @property

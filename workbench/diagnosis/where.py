@@ -85,6 +85,7 @@ def locate(problem: Problem, recordings: Sequence[Recording]) -> Where | None:
         by_regime=regime_shares(problem.base),
         intensities=Intensities(likeliest, neighbour, other.unknown[0]),
         imitated=max(1.0 - float(rest.var() / term.var()), 0.0) if term.any() else 0.0,
+        rest=rest,
         course=course,
     )
 
