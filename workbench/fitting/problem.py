@@ -134,7 +134,8 @@ def improved_base(problem: Problem, fits: Sequence[Fit]) -> Problem | None:
     """The problem with a better prior fit, where the refits found its parameters; else None.
 
     A refit whose nominal parameters alone, with its effect taken away again, are better than the
-    base has found a place that the prior fit missed; its effect would get the credit for that.
+    base, or soon lead to better ones, has found a place that the prior fit missed; its effect would
+    get the credit for that.
     """
     base = problem.base
     points = []
@@ -144,9 +145,15 @@ def improved_base(problem: Problem, fits: Sequence[Fit]) -> Problem | None:
         rows = [states.index(name) for name in base.windows.plant.state_list]
         t = base.unknowns.clipped(base.unknowns.scaled(values))
         points.append(Point(t, fit.point.starts[rows]))
-    best = points_costs(base.windows, base.unknowns, points).best if points else None
-    if not best or base.cost - best.cost < LEAST_IMPROVEMENT * problem.misfit:
+    if not points:
         return None
+    best = points_costs(base.windows, base.unknowns, points).best
+    least = base.cost - LEAST_IMPROVEMENT * problem.misfit
+    if best.cost > least:
+        tried = fit_windows(base.windows, base.unknowns, best, FIRST_ITERATIONS)
+        if tried.cost > least:
+            return None
+        best = tried.point
     better = fit_windows(base.windows, base.unknowns, best, ITERATIONS)
     held_out = problem.base_validation
     if held_out:
