@@ -3,10 +3,12 @@
 A regime is the plant itself on fewer states, with some of them held or with a command put in place
 of what is sent.  All regimes of a plant have the same states, so that estimates can be mixed.
 
-A state that is held decays within a fraction of a sample, the position behind it stays.  A bristle
+What sticks has its velocity decay within a fraction of a sample, and its position stays.  What
+slides does so in one direction, with the friction of sliding down to rest: a friction law that goes
+through zero at rest would stick by itself, and neither regime would be more likely.  A bristle
 and the dynamics of a valve are left out, by :class:`linearize.reduction.DesignModel`: what they do
 within milliseconds is what the switch between regimes stands for.  Left in, each regime could
-follow the other one, and none would be more likely.
+follow the other one.
 
 Source: Karnopp 1985 (zero velocity as a mode of its own); physics.md 4.2 and 4.3.
 """
@@ -17,8 +19,10 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from itertools import product
+from typing import Any
 
 import casadi as ca
+import numpy as np
 
 from linearize.axes import drive_axis, joint_axes, rig_axis
 from linearize.axis import Travel
@@ -31,6 +35,7 @@ from workbench.model import Model
 from workbench.plant import Plant
 
 STANDS_S = 1e-4  # in which what is held comes to rest
+FASTER = 5.0  # times the speed of rest: there friction is that of sliding
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,12 +48,15 @@ class Regime(Plant):
         The plant on the states that are kept.
     held
         Positions and their velocities that stand still.
+    sliding
+        Least speed that friction sees of a velocity, with the sign of its direction.
     sent
         Commands as they are in it, whatever is sent.
     """
 
     design: DesignModel
     held: tuple[tuple[str, str], ...] = ()
+    sliding: Mapping[str, float] = field(default_factory=dict)
     sent: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -66,6 +74,10 @@ class Regime(Plant):
         plain = ca.Function("plain", [x, u], self.design.expressions)
         rates, outputs = plain(x, ca.vertcat(ca.SX(0, 1), *sent))
         names = self.design.states
+        for velocity, least in self.sliding.items():
+            k = names.index(velocity)
+            faster = ca.fmax(x[k], least) if least > 0.0 else ca.fmin(x[k], least)
+            rates[k] = ca.substitute(rates[k], x[k], faster)
         for position, velocity in self.held:
             rates[names.index(position)] = 0.0
             rates[names.index(velocity)] = -x[names.index(velocity)] / STANDS_S
@@ -90,13 +102,9 @@ def regimes(plant: Plant) -> dict[str, Regime]:
     return dict(of(lean))
 
 
-def _regime(
-    design: DesignModel,
-    held: tuple[tuple[str, str], ...] = (),
-    sent: Mapping[str, float] | None = None,
-) -> Regime:
+def _regime(design: DesignModel, **what: Any) -> Regime:
     own = {f.name: getattr(design.plant, f.name) for f in fields(Plant)}
-    return Regime(**own, design=design, held=held, sent=sent or {})
+    return Regime(**own, design=design, **what)
 
 
 def _one(plant: Plant) -> Iterator[tuple[str, Regime]]:
@@ -104,15 +112,20 @@ def _one(plant: Plant) -> Iterator[tuple[str, Regime]]:
 
 
 def _by_travel(travels: Callable[[Plant], tuple[Travel, ...]]) -> Callable:
-    """Each of what moves sticks or slides, by itself."""
+    """Each of what moves slides down, sticks or slides up, by itself."""
 
     def of(plant: Plant) -> Iterator[tuple[str, Regime]]:
         design = _without_bristle(plant)
         several = travels(plant)
-        for sticking in product((False, True), repeat=len(several)):
-            pairs = [*zip(several, sticking, strict=True)]
-            label = " ".join(t.prefix + ("stick" if still else "slide") for t, still in pairs)
-            yield label, _regime(design, tuple((t.position, t.velocity) for t, s in pairs if s))
+        for cuts in product(*(each.friction_cut() for each in several)):
+            held, sliding = [], {}
+            for each, interval in zip(several, cuts, strict=True):
+                if interval.holds:
+                    held.append((each.position, each.velocity))
+                else:
+                    sliding[each.velocity] = np.sign(interval.point) * FASTER * each.resting
+            label = " ".join(interval.label for interval in cuts)
+            yield label, _regime(design, held=tuple(held), sliding=sliding)
 
     return of
 
