@@ -6,6 +6,7 @@ old estimate to the new one is one CasADi function, compiled as a whole and call
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -54,12 +55,17 @@ class FilterUpdate:
         self, X: np.ndarray, P: np.ndarray, u: np.ndarray, y: np.ndarray, received: np.ndarray
     ) -> Updated:
         """Of the estimate one sample before, the command since then and what is measured now."""
-        arguments, results, run = self._buffers
+        arguments, results, _ = self._buffers
         for place, value in zip(arguments, (X, P, u, y, received), strict=True):
             place[...] = value
-        run()
+        self.run()
         *arrays, likely, nis = results
         return Updated(*(each.copy() for each in arrays), float(likely[0]), float(nis[0]))
+
+    @cached_property
+    def run(self) -> Callable[[], None]:
+        """The call alone, on what the buffers hold."""
+        return self._buffers[2]
 
     @cached_property
     def function(self) -> ca.Function:
@@ -98,14 +104,13 @@ class FilterUpdate:
                 buffer.set_arg(i, _flat(each))
         for i, each in enumerate(results):
             buffer.set_res(i, _flat(each))
-        kept = (buffer, arguments, results)
-        return arguments[:5], results, _Run(run, kept)
+        return arguments[:5], results, _Run(run, (buffer, arguments, results))
 
 
 class _Run(NamedTuple):
     """A call, with what must live as long as it does."""
 
-    call: object
+    call: Callable[[], None]
     kept: tuple
 
     def __call__(self) -> None:
