@@ -5,7 +5,7 @@ Every piece is kept in the folder, so that a second start goes on.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,8 +25,21 @@ from studies.estimator_benches import (
     start,
     tuned,
 )
+from studies.estimator_claims import (
+    ALL,
+    consistency_claims,
+    consistency_text,
+    courses,
+    mode_claims,
+    modes_text,
+    position_claims,
+    position_text,
+    summary,
+    velocity_claims,
+    velocity_text,
+)
 from studies.estimator_modes import modes_named
-from studies.estimator_runs import band, follow, nees, rmse
+from studies.estimator_runs import follow, nees, rmse
 from studies.estimator_truths import (
     DRAWN,
     EXACT,
@@ -36,12 +49,10 @@ from studies.estimator_truths import (
     servo_runs,
 )
 from studies.kept import Kept
-from studies.study import Claim, Extent, Outcome, Study
-from studies.text import columns, number, percent
+from studies.study import Extent, Outcome, Study
 from workbench.plants.servo_drive import OUTPUTS, servo_drive
 
 JUDGED = ("ekf", "ukf", "mhe")  # for consistency; the others do not know the disturbance
-ALL = ("kalman", "ekf", "ukf", "imm", "mhe")
 RUNS = 50
 RUNS_DRAWN = {Extent.QUICK: 10, Extent.FULL: RUNS}
 RUNS_OF_A_PLANT = {Extent.QUICK: 3, Extent.FULL: 10}  # besides the one that tunes
@@ -51,8 +62,6 @@ AWAY = 50  # samples from the last change between rest and motion
 LATE = 200  # first sample that is judged for velocity and pressure
 VELOCITIES = {"servo_drive": "slide.velocity_m_s", "gearbox": "main_piston.velocity_m_s"}
 POSITION_ROWS = {"servo_drive": 0, "gearbox": 2}
-HALF, NEAR_PA = 0.5, 0.15e5
-NAMED = 0.95
 
 
 @dataclass(frozen=True)
@@ -81,28 +90,28 @@ def run(folder: Path, extent: Extent, say: Callable[[str], None]) -> Outcome:
     alone = _position_only(work)
     modes = modes_named(work.piece, work.folder, RUNS_OF_A_PLANT[extent], say)
     claims = (
-        *_velocity_claims(velocity),
-        *_position_claims(seen, alone),
-        *_consistency_claims(consistency[EXACT]),
-        *_mode_claims(modes),
+        *velocity_claims(velocity),
+        *position_claims(seen, alone),
+        *consistency_claims(consistency[EXACT]),
+        *mode_claims(modes),
     )
     text = "\n\n".join(
         (
-            _velocity_text(velocity),
-            _consistency_text(consistency),
-            _position_text(seen, alone),
-            _modes_text(modes),
+            velocity_text(velocity),
+            consistency_text(consistency),
+            position_text(seen, alone),
+            modes_text(modes),
         )
     )
     numbers = {
         "velocity": velocity,
-        "consistency": {k: {n: _summary(r) for n, r in v.items()} for k, v in consistency.items()},
+        "consistency": {k: {n: summary(r) for n, r in v.items()} for k, v in consistency.items()},
         "position_only": {"observability": seen, "runs": alone},
         "modes": modes,
     }
     from studies.figures.consistency import consistency_figure
 
-    curves = {name: _courses(rows) for name, rows in consistency[EXACT].items()}
+    curves = {name: courses(rows) for name, rows in consistency[EXACT].items()}
     figures = {"consistency": consistency_figure(curves, EVERY * 1e-3, 4)}
     return Outcome(text, claims, figures, numbers)
 
@@ -129,34 +138,6 @@ def _run(estimator: Any, whole: TrueRun) -> dict[str, Any]:
         "nees": [*map(float, nees(found, cut)[asked])],
         "nis": [*map(float, found.nis[asked])],
         "moving": [*map(int, moving[asked])],
-    }
-
-
-def _courses(rows: Sequence[Mapping[str, Any]]) -> tuple[np.ndarray, np.ndarray]:
-    """Mean over the runs that move at a sample, NaN where fewer than half do, and how many."""
-    values, moving = (np.array([row[key] for row in rows]) for key in ("nees", "moving"))
-    there = moving.sum(axis=0)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        mean = np.where(there >= len(rows) / 2, (values * moving).sum(axis=0) / there, np.nan)
-    return mean, there
-
-
-def _summary(rows: Sequence[Mapping[str, Any]]) -> dict[str, float]:
-    """Means over moving samples of all runs, and the share of samples inside their own band."""
-    values, nis, moving = (
-        np.array([row[key] for row in rows], dtype=float) for key in ("nees", "nis", "moving")
-    )
-    mean, there = _courses(rows)
-    judged = [(m, *band(4, n)) for m, n in zip(mean, there, strict=True) if np.isfinite(m)]
-    inside = [low <= m <= high for m, low, high in judged]
-    low, high = band(4, len(rows))
-    return {
-        "nees": float(values[moving > 0].mean()),
-        "low": low,
-        "high": high,
-        "inside": float(np.mean(inside)) if inside else float("nan"),
-        "nis": float(nis[moving > 0].mean()),
-        "runs": len(rows),
     }
 
 
@@ -219,90 +200,6 @@ def _position_only(work: Work) -> list[Mapping[str, Any]]:
     count = RUNS_OF_A_PLANT[work.extent]
     runs = servo_runs(EXACT, RUNS, work.folder)[:count]
     return [work.piece(f"position only {k}", lambda r=r: one(r)) for k, r in enumerate(runs)]
-
-
-def _velocity_claims(found: Mapping[str, Mapping[str, float]]) -> Iterator[Claim]:
-    for plant, rows in found.items():
-        told = ", ".join(f"{name} {number(rows[name] / rows['derivative'], 3)}" for name in ALL)
-        yield Claim(
-            f"{plant}: the EKF's velocity error is below half of the filtered derivative's",
-            told,
-            rows["ekf"] < HALF * rows["derivative"],
-        )
-
-
-def _position_claims(
-    seen: Mapping[str, Any], alone: Sequence[Mapping[str, float]]
-) -> Iterator[Claim]:
-    worst = max(max(row["a"], row["b"]) for row in alone)
-    yield Claim(
-        "servo_drive, position alone: pressures in motion within 0.15 bar",
-        f"{1e-5 * worst:.3f} bar RMS in the worst of {len(alone)} runs",
-        worst < NEAR_PA,
-    )
-    yield Claim(
-        "servo_drive, position alone: all modes that slide are observable",
-        f"{seen['whole']} of {seen['modes']} modes; not: sticking",
-        all("stick" in name for name in seen["not"]),
-    )
-
-
-def _consistency_claims(found: Mapping[str, Sequence[Mapping[str, Any]]]) -> Iterator[Claim]:
-    for name, rows in found.items():
-        s = _summary(rows)
-        yield Claim(
-            f"{name}: NEES over {s['runs']} runs inside its 95 % band",
-            f"{s['nees']:.2f} of {s['low']:.2f} to {s['high']:.2f}",
-            s["low"] <= s["nees"] <= s["high"],
-        )
-
-
-def _mode_claims(found: Mapping[str, Mapping[str, float]]) -> Iterator[Claim]:
-    for what, row in found.items():
-        yield Claim(
-            f"IMM names {what} in 95 % of samples", percent(row["share"], 1), row["share"] >= NAMED
-        )
-
-
-def _velocity_text(found: Mapping[str, Mapping[str, float]]) -> str:
-    head = ("velocity RMSE m/s, drawn truth", "derivative", *ALL)
-    lines = [
-        (plant, *(number(rows[name], 3) for name in ("derivative", *ALL)))
-        for plant, rows in found.items()
-    ]
-    return f"{columns(head, lines)}\nthe derivative has the lag that is best for it"
-
-
-def _consistency_text(found: Mapping[str, Mapping[str, Sequence[Mapping[str, Any]]]]) -> str:
-    head = ("truth", "estimator", "runs", "NEES", "band", "samples inside", "NIS of 3")
-    lines = []
-    for kind, rows in found.items():
-        for name, several in rows.items():
-            s = _summary(several)
-            ends = f"{s['low']:.2f} to {s['high']:.2f}"
-            lines.append(
-                (kind, name, str(s["runs"]), number(s["nees"], 3), ends,
-                 percent(s["inside"]), number(s["nis"], 3))
-            )  # fmt: skip
-    return f"{columns(head, lines)}\nposition, velocity and pressures in motion; drawn not judged"
-
-
-def _position_text(seen: Mapping[str, Any], alone: Sequence[Mapping[str, float]]) -> str:
-    lines = [
-        (str(k), number(1e-5 * row["a"], 3), number(1e-5 * row["b"], 3))
-        for k, row in enumerate(alone)
-    ]
-    told = f"the position alone sees the whole state in {seen['whole']} of {seen['modes']} modes"
-    return f"{told}\n{columns(('run', 'pressure a RMSE bar', 'pressure b RMSE bar'), lines)}"
-
-
-def _modes_text(found: Mapping[str, Mapping[str, float]]) -> str:
-    head = ("IMM names", "right", "counted", "phases")
-    lines = [
-        (what, percent(r["share"], 1), percent(r["counted"]), f"{r['phases']:.0f}")
-        for what, r in found.items()
-    ]
-    return f"{columns(head, lines)}\nwithout the first 10 ms of each phase"
 
 
 STUDY = Study(
