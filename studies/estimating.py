@@ -117,6 +117,7 @@ class _Bench:
 
     def compared(self, names: tuple[str, ...]) -> EstimatedRecording:
         """All estimators, one after the other."""
+        hidden = self.hidden  # what is wrong with it is said before any work
         self.say(f"{self.recording.name}: process noise by likelihood")
         tuned = self.tuned
         rows = tuple(self._row(name) for name in names)
@@ -127,7 +128,7 @@ class _Bench:
             dt,
             self.noise,
             tuned,
-            self.hidden,
+            hidden,
             self.simulated,
             rows,
         )
