@@ -7,6 +7,7 @@ from scipy.linalg import expm, solve_discrete_are
 from test_estimators import DT_S, NOISE_M, cart_data, on_cart, run
 
 from estimators import ESTIMATORS
+from estimators.ahead import Ahead, in_time
 from estimators.augmentation import Unknown, augmented
 from estimators.foreseen import Foresight
 from estimators.gated import Gated
@@ -271,3 +272,18 @@ def test_a_measured_input_among_the_commands_drives_the_same_plant():
 
     assert np.array_equal(apart, together)
     assert isinstance(fed, Plant) and fed.model.commands[-1] == "supply.pressure_pa"
+
+
+@pytest.mark.parametrize("name", ["kalman", "imm"])
+def test_an_estimate_of_fewer_states_is_carried_over_a_delay_too(name):
+    late = servo_drive().with_values({"command_delay.delay_s": 3e-3}).lean()
+    plant = servo_drive().lean()
+    bare, ahead = on_drive(name), in_time(on_drive(name, late), late)
+    y = np.array([0.145, 5.65e5, 5.65e5])
+    now, carried = bare.start(y), ahead.start(y)
+    for _ in range(5):
+        now = bare.update(now, plant.nominal[0], y)
+        carried = ahead.update(carried, plant.nominal[0], y)
+
+    assert isinstance(ahead, Ahead) and carried.names == now.names
+    assert carried.pick(OUTPUTS) == pytest.approx(now.pick(OUTPUTS), rel=1e-3)
