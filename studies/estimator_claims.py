@@ -15,6 +15,7 @@ ALL = ("kalman", "ekf", "ukf", "imm", "mhe")
 HALF, NEAR_PA = 0.5, 0.15e5
 NAMED = 0.95
 DEGREES = 4  # position, velocity, two pressures
+OUTPUTS = 3
 Rows = Sequence[Mapping[str, Any]]
 
 
@@ -98,18 +99,27 @@ def velocity_text(found: Mapping[str, Mapping[str, float]]) -> str:
     return f"{columns(head, lines)}\nthe derivative has the lag that is best for it"
 
 
-def consistency_text(found: Mapping[str, Mapping[str, Sequence[Mapping[str, Any]]]]) -> str:
-    head = ("truth", "estimator", "runs", "NEES", "band", "samples inside", "NIS of 3")
+def consistency_text(
+    found: Mapping[str, Mapping[str, Rows]], coloured: Mapping[str, Mapping[str, float]]
+) -> str:
+    """NEES and NIS with their bands, and whiteness, by truth and estimator."""
+    head = ("truth", "estimator", "runs", "NEES", "band", "samples inside", "NIS", "band",
+            "coloured lags")  # fmt: skip
     lines = []
     for kind, rows in found.items():
         for name, several in rows.items():
             s = summary(several)
-            ends = f"{s['low']:.2f} to {s['high']:.2f}"
+            low, high = band(OUTPUTS, len(several))
             lines.append(
-                (kind, name, str(s["runs"]), number(s["nees"], 3), ends,
-                 percent(s["inside"]), number(s["nis"], 3))
+                (kind, name, str(s["runs"]), number(s["nees"], 3),
+                 f"{s['low']:.2f} to {s['high']:.2f}", percent(s["inside"]),
+                 number(s["nis"], 3), f"{low:.2f} to {high:.2f}", percent(coloured[kind][name]))
             )  # fmt: skip
-    return f"{columns(head, lines)}\nposition, velocity and pressures in motion; drawn not judged"
+    return (
+        f"{columns(head, lines)}\nposition, velocity and pressures in motion, on average over "
+        "runs; drawn parameters are not judged; 5 % of the lags are coloured if innovations are "
+        "white"
+    )
 
 
 def position_text(seen: Mapping[str, Any], alone: Sequence[Mapping[str, float]]) -> str:

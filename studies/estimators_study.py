@@ -39,7 +39,7 @@ from studies.estimator_claims import (
     velocity_text,
 )
 from studies.estimator_modes import modes_named
-from studies.estimator_runs import follow, nees, rmse
+from studies.estimator_runs import follow, nees, rmse, whiteness
 from studies.estimator_truths import (
     DRAWN,
     EXACT,
@@ -85,6 +85,7 @@ def run(folder: Path, extent: Extent, say: Callable[[str], None]) -> Outcome:
     """All parts of the study, piece by piece."""
     work = Work(folder / "work", extent, Kept(folder / "work" / "rows.jsonl"), say)
     consistency = {kind: _consistency(work, kind) for kind in (EXACT, DRAWN)}
+    white = {kind: _coloured(work, kind) for kind in (EXACT, DRAWN)}
     velocity = {plant: _velocity(work, plant) for plant in VELOCITIES}
     seen = work.piece("observability by the position", _observability)
     alone = _position_only(work)
@@ -98,7 +99,7 @@ def run(folder: Path, extent: Extent, say: Callable[[str], None]) -> Outcome:
     text = "\n\n".join(
         (
             velocity_text(velocity),
-            consistency_text(consistency),
+            consistency_text(consistency, white),
             position_text(seen, alone),
             modes_text(modes),
         )
@@ -106,6 +107,7 @@ def run(folder: Path, extent: Extent, say: Callable[[str], None]) -> Outcome:
     numbers = {
         "velocity": velocity,
         "consistency": {k: {n: summary(r) for n, r in v.items()} for k, v in consistency.items()},
+        "coloured_lags": white,
         "position_only": {"observability": seen, "runs": alone},
         "modes": modes,
     }
@@ -126,6 +128,20 @@ def _consistency(work: Work, kind: str) -> dict[str, list[Mapping[str, Any]]]:
             work.piece(f"consistency {kind} {name} {k}", lambda e=estimator, r=r: _run(e, r))
             for k, r in enumerate(runs)
         ]
+    return found
+
+
+def _coloured(work: Work, kind: str) -> dict[str, float]:
+    """Share of lags at which the innovations of the first run are correlated, by estimator."""
+    first, found = servo_runs(kind, RUNS, work.folder)[0], {}
+
+    def one(estimator: Any) -> dict[str, float]:
+        run = follow(estimator, first.commands[:, :SAMPLES], first.measured[:, :SAMPLES], 1)
+        return {"share": float(np.mean(whiteness(run.innovations[:, LATE:])))}
+
+    for name in JUDGED:
+        piece = work.piece(f"whiteness {kind} {name}", lambda name=name: one(consistent(name)))
+        found[name] = piece["share"]
     return found
 
 

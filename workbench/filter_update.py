@@ -47,7 +47,10 @@ class _WholeFilter(PlantFilter):
 
 @dataclass(frozen=True)
 class FilterUpdate:
-    """Predict, then correct, in one call; ``filter`` must use every sample."""
+    """Predict, then correct, in one call; ``filter`` must use every sample.
+
+    The buffers are its own, so that two threads need one each.
+    """
 
     filter: PlantFilter
 
