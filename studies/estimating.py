@@ -17,7 +17,15 @@ import numpy as np
 
 from estimators import ESTIMATORS
 from estimators.tuning import TunedNoise, tuned_noise
-from studies.estimator_runs import Followed, fed, follow, foretold, rmse, whiteness
+from studies.estimator_runs import (
+    Followed,
+    fed,
+    follow,
+    foretold,
+    rmse,
+    whiteness,
+    with_start,
+)
 from workbench.comparison.noise import recorded_noise
 from workbench.effect import Kind
 from workbench.errors import InputError, Message, listed, nearest
@@ -70,7 +78,10 @@ class Estimated:
 
 @dataclass(frozen=True)
 class EstimatedRecording:
-    """All estimators on one recording, with what they were told and what is true."""
+    """All estimators on one recording, with what they were told and what is true.
+
+    ``lost`` says of estimators that have no row why.
+    """
 
     name: str
     outputs: tuple[str, ...]
@@ -80,6 +91,7 @@ class EstimatedRecording:
     hidden: str
     truth: Recording
     rows: tuple[Estimated, ...]
+    lost: Mapping[str, str]
 
 
 def estimate_rig(
@@ -97,6 +109,8 @@ def estimate_rig(
     ------
     InputError
         If there is no such estimator or effect, or the plant has no states.
+    ArithmeticError
+        If every estimator is lost.
     """
     names = tuple(names)
     for name in names:
@@ -120,7 +134,15 @@ class _Bench:
         hidden = self.hidden  # what is wrong with it is said before any work
         self.say(f"{self.recording.name}: process noise by likelihood")
         tuned = self.tuned
-        rows = tuple(self._row(name) for name in names)
+        rows, lost = [], {}
+        for name in names:
+            try:
+                rows.append(self._row(name))
+            except ArithmeticError as error:
+                lost[name] = str(error)
+        if not rows:
+            told = "; ".join(f"{name} {why}" for name, why in lost.items())
+            raise ArithmeticError(f"{self.recording.name}: no estimator held: {told}")
         plant, dt = self.plant, self.recording.sample_time_s
         return EstimatedRecording(
             self.recording.name,
@@ -130,7 +152,8 @@ class _Bench:
             tuned,
             hidden,
             self.simulated,
-            rows,
+            tuple(rows),
+            lost,
         )
 
     def _row(self, name: str) -> Estimated:
@@ -184,7 +207,7 @@ class _Bench:
     def _made(self, name: str) -> Any:
         plant = self.plant.with_inputs_commanded()
         states, size = plant.model.states, self.deviations
-        more = {} if name == "mhe" else {"initial_deviation": dict(zip(states, size, strict=True))}
+        more = with_start(ESTIMATORS[name], dict(zip(states, size, strict=True)))
         return ESTIMATORS[name](
             plant=plant,
             sample_time_s=self.recording.sample_time_s,

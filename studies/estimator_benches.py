@@ -12,6 +12,7 @@ from scipy.signal import lfilter
 from estimators import ESTIMATORS
 from estimators.augmentation import AugmentedPlant, Unknown, augmented
 from estimators.tuning import tuned_noise
+from studies.estimator_runs import with_start
 from studies.estimator_truths import TrueRun
 from workbench.effects.empirical import ConstantFlow
 from workbench.plant import Plant
@@ -78,13 +79,12 @@ def made(
     name: str, plant: Plant, process_noise: Mapping[str, float], start: Mapping[str, float]
 ) -> Any:
     """An estimator for a plant with the sensors of physics.md section 2."""
-    more = {} if name == "mhe" else {"initial_deviation": start}
     return ESTIMATORS[name](
         plant=plant,
         sample_time_s=1.0 / 400 if plant.name == "soft_joint" else 1e-3,
         measurement_noise={n: SENSORS[n] for n in plant.measured},
         process_noise=process_noise,
-        **more,
+        **with_start(ESTIMATORS[name], start),
     )
 
 

@@ -96,7 +96,7 @@ def velocity_text(found: Mapping[str, Mapping[str, float]]) -> str:
         (plant, *(number(rows[name], 3) for name in ("derivative", *ALL)))
         for plant, rows in found.items()
     ]
-    return f"{columns(head, lines)}\nthe derivative has the lag that is best for it"
+    return f"{columns(head, lines)}\nthe derivative has the lag that is best for it; - lost"
 
 
 def consistency_text(

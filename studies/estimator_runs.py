@@ -58,6 +58,11 @@ def follow(estimator: Any, commands: np.ndarray, measured: np.ndarray, every: in
 
     u[k] acts from sample k to the next.  Innovations are asked for at every so many samples, since
     they cost a second update; 0 asks for none.
+
+    Raises
+    ------
+    ArithmeticError
+        If the estimator is lost, with the sample.
     """
     sight = Foresight(estimator)
     estimate = estimator.start(measured[:, 0])
@@ -68,12 +73,24 @@ def follow(estimator: Any, commands: np.ndarray, measured: np.ndarray, every: in
         if every and k % every == 0 and np.isfinite(y).any():
             seen = _innovation(*sight.outputs(sight.blind(estimate, sent), sent), y)
         begun = perf_counter()
-        estimate = estimator.update(estimate, sent, y)
+        estimate = _updated(estimator, estimate, sent, y, k)
         took = perf_counter() - begun
         rows.append((estimate.state, estimate.covariance, took, *seen))
         told.append(estimate.notes)
         sent = commands[:, k]
     return _followed(estimate, rows, told)
+
+
+def _updated(
+    estimator: Any, last: Estimate, command: np.ndarray, y: np.ndarray, k: int
+) -> Estimate:
+    try:
+        now = estimator.update(last, command, y)
+    except RuntimeError as error:  # CasADi's word for a matrix that cannot be factorised
+        raise ArithmeticError(f"lost at sample {k}: {str(error)[:60]}") from error
+    if not np.isfinite(now.state).all():
+        raise ArithmeticError(f"lost at sample {k}: its state is no number")
+    return now
 
 
 def _innovation(
@@ -90,6 +107,12 @@ def _followed(last: Estimate, rows: Sequence[tuple], told: Sequence[Mapping]) ->
     keys = dict.fromkeys(key for notes in told for key in notes)
     notes = {key: np.array([each.get(key, np.nan) for each in told]) for key in keys}
     return Followed(last.names, states.T, covariances, innovations.T, nis, received, took, notes)
+
+
+def with_start(kind: Any, deviation: Mapping[str, float]) -> dict[str, Mapping[str, float]]:
+    """The deviations of the start as a field, for kinds of estimators that have one."""
+    known = "initial_deviation" in kind.__dataclass_fields__
+    return {"initial_deviation": deviation} if known else {}
 
 
 def fed(plant: Plant, recording: Recording) -> tuple[Plant, np.ndarray, np.ndarray]:

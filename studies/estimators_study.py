@@ -105,7 +105,10 @@ def run(folder: Path, extent: Extent, say: Callable[[str], None]) -> Outcome:
         )
     )
     numbers = {
-        "velocity": velocity,
+        "velocity": {
+            plant: {n: v if np.isfinite(v) else None for n, v in rows.items()}
+            for plant, rows in velocity.items()
+        },
         "consistency": {k: {n: summary(r) for n, r in v.items()} for k, v in consistency.items()},
         "coloured_lags": white,
         "position_only": {"observability": seen, "runs": alone},
@@ -179,12 +182,19 @@ def _velocity(work: Work, plant: str) -> dict[str, Any]:
             )["rmse"]
             for k, r in enumerate(runs)
         ]
-        found[name] = float(np.sqrt(np.mean(np.square(errors))))
+        kept = np.array([np.nan if each is None else each for each in errors])
+        found[name] = float(np.sqrt(np.mean(np.square(kept))))  # NaN where a run was lost
     return found
 
 
-def _error(name: str, plant: Any, noise: Mapping[str, float], r: TrueRun, state: str) -> float:
-    found = follow(made(name, plant, noise, start(plant)), r.commands, r.measured, 0)
+def _error(
+    name: str, plant: Any, noise: Mapping[str, float], r: TrueRun, state: str
+) -> float | None:
+    """RMS error of a state, none where the estimator was lost."""
+    try:
+        found = follow(made(name, plant, noise, start(plant)), r.commands, r.measured, 0)
+    except ArithmeticError:
+        return None
     return rmse((found.state(state) - r.truth[state])[LATE:])
 
 

@@ -43,6 +43,7 @@ def _recording_text(each: EstimatedRecording) -> str:
             f"on the rig's plant under the recorded inputs: RMS error by state, with "
             f"{each.hidden} hidden, and of outputs after 50 ms without any",
             _states(each),
+            *(f"{name}: {why}" for name, why in each.lost.items()),
         )
     )
 
@@ -98,6 +99,7 @@ def _recording_document(each: EstimatedRecording) -> dict[str, Any]:
         "noise": {public_name(n): _value(v, n) for n, v in each.noise.items()},
         "process_noise_factors": dict(each.tuned.factors),
         "hidden": each.hidden,
+        "lost": dict(each.lost),
         "estimators": [_row_document(each, row) for row in each.rows],
     }
 

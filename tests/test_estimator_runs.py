@@ -1,6 +1,6 @@
 """What is read off a run of an estimator: bands, whiteness, consistency, tuning, prediction."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -141,3 +141,29 @@ def test_the_first_samples_of_each_phase_are_not_counted():
         counted(mode, 3).tolist()
         == [False] * 3 + [True] * 3 + [False] * 3 + [True] * 2 + [False] * 2
     )
+
+
+@dataclass(frozen=True)
+class Failing:
+    """A filter whose matrices cannot be factorised from some sample on, or that becomes NaN."""
+
+    inner: object
+    error: Exception | None
+
+    @property
+    def plant(self):
+        return self.inner.plant
+
+    def start(self, measurement):
+        return self.inner.start(measurement)
+
+    def update(self, last, command, measurement):
+        if self.error:
+            raise self.error
+        return replace(last, state=np.full(2, np.nan))
+
+
+@pytest.mark.parametrize("error", [RuntimeError("Linsol failed"), None])
+def test_an_estimator_that_is_lost_says_where(error):
+    with pytest.raises(ArithmeticError, match="lost at sample 0"):
+        follow(Failing(on_its_start(), error), np.zeros((1, 5)), np.zeros((1, 5)), 0)
