@@ -16,7 +16,9 @@ from linearize.analysis import analyse_all
 from linearize.standard import standard_modes
 from studies.estimator_benches import (
     BENCHES,
+    BREAKING_AWAY,
     NUMERICAL,
+    OFF_PA,
     at_rest,
     consistent,
     derivative_rmse,
@@ -210,9 +212,9 @@ def _observability() -> dict[str, Any]:
 def _position_only(work: Work) -> list[Mapping[str, Any]]:
     """Errors of both pressures in motion from the position alone, a row per run."""
     plant = position_only()
-    noise = NUMERICAL | plant.process_noise
-    wide = at_rest(plant) | dict.fromkeys(OUTPUTS[1:], 0.3e5)
-    wide |= {n: 0.05 * float(s) for n, s in zip(plant.model.states, plant.initial, strict=True)
+    noise = NUMERICAL | plant.process_noise | BREAKING_AWAY
+    wide = at_rest(plant) | dict.fromkeys(OUTPUTS[1:], OFF_PA)
+    wide |= {n: 0.1 * float(s) for n, s in zip(plant.model.states, plant.initial, strict=True)
              if n.endswith(".mass_kg")}  # fmt: skip
     estimator = made("ekf", plant, noise, wide)
 
@@ -223,9 +225,11 @@ def _position_only(work: Work) -> list[Mapping[str, Any]]:
         errors = [(found.state(name) - r.truth[name])[moving] for name in OUTPUTS[1:]]
         return {"a": rmse(errors[0]), "b": rmse(errors[1])}
 
-    count = RUNS_OF_A_PLANT[work.extent]
+    count = RUNS_DRAWN[work.extent]
     runs = servo_runs(EXACT, RUNS, work.folder)[:count]
-    return [work.piece(f"position only {k}", lambda r=r: one(r)) for k, r in enumerate(runs)]
+    return [
+        work.piece(f"pressures by the position {k}", lambda r=r: one(r)) for k, r in enumerate(runs)
+    ]
 
 
 STUDY = Study(
