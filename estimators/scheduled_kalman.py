@@ -27,6 +27,21 @@ from workbench.contracts import Estimate
 from workbench.filtering import consistent_start, correct, predict
 from workbench.plant import Plant
 
+MISSED = {"velocity_m_s": 2.0, "velocity_rad_s": 2.0, "pressure_pa": 1.0}  # shares of a scale
+
+
+def noise_of_modes(plant: Plant, process_noise: Mapping[str, float]) -> dict[str, float]:
+    """Process noise with no less than linear modes miss of a plant that moves through them.
+
+    Noise that was tuned on the nonlinear plant would make this filter sure of a wrong line.  The
+    shares, per square root of a second, are *chosen*.
+    """
+    sizes = zip(plant.model.states, plant.scale, strict=True)
+    least = {n: MISSED.get(n.rpartition(".")[2], 0.0) * float(size) for n, size in sizes}
+    return {name: max(process_noise.get(name, 0.0), q) for name, q in least.items() if q} | {
+        name: q for name, q in process_noise.items() if not least.get(name)
+    }
+
 
 @dataclass(frozen=True, kw_only=True)
 class ScheduledKalman:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from estimators import ESTIMATORS
+from estimators.scheduled_kalman import noise_of_modes
 from estimators.tuning import TunedNoise, tuned_noise
 from studies.estimator_runs import (
     Followed,
@@ -143,11 +144,10 @@ class _Bench:
         if not rows:
             told = "; ".join(f"{name} {why}" for name, why in lost.items())
             raise ArithmeticError(f"{self.recording.name}: no estimator held: {told}")
-        plant, dt = self.plant, self.recording.sample_time_s
         return EstimatedRecording(
             self.recording.name,
-            plant.measured,
-            dt,
+            self.plant.measured,
+            self.recording.sample_time_s,
             self.noise,
             tuned,
             hidden,
@@ -207,13 +207,13 @@ class _Bench:
     def _made(self, name: str) -> Any:
         plant = self.plant.with_inputs_commanded()
         states, size = plant.model.states, self.deviations
-        more = with_start(ESTIMATORS[name], dict(zip(states, size, strict=True)))
+        noise = self.tuned.process_noise
         return ESTIMATORS[name](
             plant=plant,
             sample_time_s=self.recording.sample_time_s,
             measurement_noise=self.noise,
-            process_noise=self.tuned.process_noise,
-            **more,
+            process_noise=noise_of_modes(plant, noise) if name == "kalman" else noise,
+            **with_start(ESTIMATORS[name], dict(zip(states, size, strict=True))),
         )
 
     @cached_property

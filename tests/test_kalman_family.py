@@ -12,7 +12,7 @@ from estimators.augmentation import Unknown, augmented
 from estimators.foreseen import Foresight
 from estimators.gated import Gated
 from estimators.late import Late
-from estimators.scheduled_kalman import standard_bank
+from estimators.scheduled_kalman import noise_of_modes, standard_bank
 from workbench.filtering import consistent_start
 from workbench.plant import Plant
 from workbench.plants import PLANTS
@@ -92,7 +92,7 @@ def test_a_mode_that_lasts_comes_to_the_gain_of_its_riccati_equation():
 def test_the_scheduled_filter_follows_the_drive_through_its_modes():
     plant = servo_drive().lean()
     step, (_, d, p) = plant.model.compiled_step(1e-3), plant.nominal
-    curved = {VELOCITY: 2.0, **dict.fromkeys(OUTPUTS[1:], 1e5)}  # what linear modes miss
+    curved = noise_of_modes(plant, {VELOCITY: 0.1, "friction.deflection_m": 1e-6})
     kalman, rng = on_drive("kalman", process_noise=curved), np.random.default_rng(5)
     estimate, modes, errors, sent, x, speed = None, set(), [], plant.nominal[0], plant.initial, []
     for k in range(1500):
@@ -105,6 +105,7 @@ def test_the_scheduled_filter_follows_the_drive_through_its_modes():
         speed.append(x[1])
         x, sent = step(x, u, d, p).full().ravel(), u
 
+    assert curved[VELOCITY] == 2.0 and curved["friction.deflection_m"] == 1e-6
     assert len(modes) >= 4
     assert np.std(errors) < 0.1 * np.std(speed)
 
