@@ -83,9 +83,30 @@ def log_likelihoods(found: PlantFilter, recording: Recording, factors: np.ndarra
     ``factors`` (n_w, n) multiply the intensities of ``found``; 0 switches an input off.  Returns
     shape (n,), not finite where a run was lost.
     """
-    n = factors.shape[1]
     pairs = zip(*(_covariances(found, column) for column in factors.T), strict=True)
-    P, Q = (np.array([each.ravel() for each in several]).T for several in pairs)
+    return _likelihoods(found, recording, *map(np.array, pairs))
+
+
+def log_likelihoods_of_noise(
+    found: PlantFilter, recording: Recording, noises: np.ndarray
+) -> np.ndarray:
+    """The same for several process noises, (n, n_x): what states gain per square root of a second.
+
+    Unknown inputs keep their intensity.
+    """
+    relative = np.pad(noises / found.plant.scale, ((0, 0), (0, len(found.unknown_inputs))))
+    step_s = found.sample_time_s * found.decimate
+    walks = np.diag([*np.zeros(len(found.plant.scale)), *np.ones(len(found.unknown_inputs))])
+    Q = step_s * walks + step_s * relative[:, :, None] ** 2 * np.eye(len(found.scale))
+    return _likelihoods(found, recording, np.tile(found.start_covariance, (len(Q), 1, 1)), Q)
+
+
+def _likelihoods(
+    found: PlantFilter, recording: Recording, starts: np.ndarray, steps: np.ndarray
+) -> np.ndarray:
+    """Log-likelihood for each pair of start and step covariance, (n, n_X, n_X) both; (n,)."""
+    n = len(starts)
+    P, Q = (each.reshape(n, -1).T for each in (starts, steps))
     total = np.zeros((1, n))
     block, one = found.likelihood.fold(BLOCK), found.likelihood
     threads = min(n, os.cpu_count() or 1)

@@ -125,7 +125,8 @@ def check(
     rig: RigFile,
     design: DesignFile,
     estimator: Annotated[
-        list[str] | None, typer.Option("--estimator", metavar="NAME", help="ekf (usual) or mhe.")
+        list[str] | None,
+        typer.Option("--estimator", metavar="NAME", help="ekf (usual), ukf, imm, mhe."),
     ] = None,
     scenario: Annotated[
         list[str] | None, typer.Option("--scenario", metavar="NAME", help="step, sine; both.")
