@@ -20,6 +20,7 @@ feedback control", for one iteration per sample and the shift.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -28,10 +29,12 @@ import numpy as np
 
 from estimators.losses import Loss
 from estimators.window_nodes import WindowNodes
+from workbench.called import prepared
 from workbench.compiled import compiled
 from workbench.plant_filter import PlantFilter
 
 Parts = dict[str, ca.MX]
+Call = Callable[..., list[np.ndarray]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,15 +85,21 @@ class Horizon:
 
     def part(self, tape: np.ndarray, name: str) -> np.ndarray:
         """One part of a tape, a view of it."""
-        names = list(self.sizes)
-        lengths = [rows * columns for rows, columns in self.sizes.values()]
-        first = sum(lengths[: names.index(name)])
-        flat = tape[first : first + lengths[names.index(name)]]
-        return flat.reshape(self.sizes[name], order="F")
+        where, shape = self._places[name]
+        return tape[where].reshape(shape, order="F")
+
+    @cached_property
+    def _places(self) -> dict[str, tuple[slice, tuple[int, int]]]:
+        """Where each part stands on the tape, and its shape."""
+        ends = np.cumsum([0, *(rows * columns for rows, columns in self.sizes.values())]).tolist()
+        spans = map(slice, ends, ends[1:])
+        return {
+            name: (span, self.sizes[name]) for name, span in zip(self.sizes, spans, strict=True)
+        }
 
     def begun(self, X: np.ndarray, P: np.ndarray) -> np.ndarray:
         """A tape on which nothing has happened yet; X (n,) is known with covariance P (n, n)."""
-        tape = np.zeros(sum(rows * columns for rows, columns in self.sizes.values()))
+        tape = np.zeros(self._length)
         known = np.column_stack([X, P])
         filled = dict(prior=known, handed=known, points=X[:, None], F=np.eye(len(X)))
         for name, value in filled.items():
@@ -99,8 +108,12 @@ class Horizon:
         self.part(tape, "u")[:] = self.found.plant.nominal[0][:, None]
         return tape
 
+    @property
+    def _length(self) -> int:
+        return sum(rows * columns for rows, columns in self.sizes.values())
+
     @cached_property
-    def sample(self) -> ca.Function:
+    def sample(self) -> Call:
         """(tape, news, d, p) -> (tape, told) one sample later, after one full Gauss-Newton step.
 
         ``news`` is the command since the last sample, then y over its noise, then what of it was
@@ -110,17 +123,17 @@ class Horizon:
         solved, (before, *newest) = self._solved(self._moved(tape, news, d, p), 0.0)
         later, after = self._run(solved, d, p)
         results = [self._tape(later), ca.veccat(before, after, *newest)]
-        return compiled(ca.Function("mhe_sample", [tape, news, d, p], results))
+        return _ready("mhe_sample", [tape, news, d, p], results)
 
     @cached_property
-    def move(self) -> ca.Function:
+    def move(self) -> Call:
         """(tape, news, d, p) -> the tape one sample later, before a step."""
         tape, news, d, p = self._symbols("tape", "news", "d", "p")
         results = [self._tape(self._moved(tape, news, d, p))]
-        return compiled(ca.Function("mhe_move", [tape, news, d, p], results))
+        return _ready("mhe_move", [tape, news, d, p], results)
 
     @cached_property
-    def solve(self) -> ca.Function:
+    def solve(self) -> Call:
         """(tape, push) -> (tape, told): the first X and the noise of the linear problem.
 
         ``push`` is P^-1 times what bounds move the newest X by.  ``told`` is the cost before the
@@ -128,27 +141,26 @@ class Horizon:
         """
         tape, push = self._symbols("tape", "push")
         solved, told = self._solved(self._parts(tape), push)
-        return compiled(
-            ca.Function("mhe_solve", [tape, push], [self._tape(solved), ca.veccat(*told)])
-        )
+        return _ready("mhe_solve", [tape, push], [self._tape(solved), ca.veccat(*told)])
 
     @cached_property
-    def run(self) -> ca.Function:
+    def run(self) -> Call:
         """(tape, d, p) -> (tape, cost): the plant runs from the first point under the noise."""
         tape, d, p = self._symbols("tape", "d", "p")
         later, cost = self._run(self._parts(tape), d, p)
-        return compiled(ca.Function("mhe_run", [tape, d, p], [self._tape(later), cost]))
+        return _ready("mhe_run", [tape, d, p], [self._tape(later), cost])
 
     @cached_property
     def at(self) -> WindowNodes:
         """What happens at one node."""
-        return WindowNodes(found=self.found, loss=self.loss, coarsest_s=self.coarsest_s)
+        return WindowNodes(
+            found=self.found, constants=self.constants, loss=self.loss, coarsest_s=self.coarsest_s
+        )
 
     def _symbols(self, *names: str) -> list[ca.MX]:
         _, *inputs = self.found.plant.model.symbols
         n_u, n_d, n_p = (s.numel() for s in inputs)
-        length = sum(rows * columns for rows, columns in self.sizes.values())
-        sizes = dict(tape=length, news=n_u + 2 * self.at.n_y, push=self.at.n, d=n_d, p=n_p)
+        sizes = dict(tape=self._length, news=n_u + 2 * self.at.n_y, push=self.at.n, d=n_d, p=n_p)
         return [ca.MX.sym(name, sizes[name]) for name in names]
 
     def _parts(self, tape: ca.MX) -> Parts:
@@ -236,3 +248,8 @@ class Horizon:
         width = value.shape[1] // (self.nodes - 1)
         columns = np.arange(value.shape[1]).reshape(-1, width)[::-1].ravel()
         return value[:, columns.tolist()]
+
+
+def _ready(name: str, symbols: list[ca.MX], results: list[ca.MX]) -> Call:
+    """A function of columns, machine code where there is a compiler."""
+    return prepared(compiled(ca.Function(name, symbols, results)))

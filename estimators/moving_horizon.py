@@ -30,13 +30,18 @@ from estimators.extended_kalman import ExtendedKalman
 from estimators.horizon import Horizon
 from estimators.losses import Loss, Squared
 from estimators.nearest_inside import OutsideError, nearest_inside
-from workbench.called import called
 from workbench.contracts import Estimate
 from workbench.plant import Plant, require
 from workbench.rosenbrock import COARSEST_STEP_S
 
 HALVINGS = 4
-ROUNDING = 1e-9  # of a cost, by which it may seem to grow
+GROWTH, ROUNDING = 1e-3, 1e-9  # share and size by which a step may raise the cost: at rest, the
+# kinks of friction leave no direction that lowers it
+
+
+def allowed(cost: float) -> float:
+    """The highest cost that a step may lead to from this one."""
+    return cost * (1.0 + GROWTH) + ROUNDING
 
 
 class LostError(ArithmeticError):
@@ -142,8 +147,8 @@ class MovingHorizon:
             return self._told(step.window, notes)
         memory = last.memory.X, last.memory.P
         found = self.kalman.update(replace(last, memory=memory), command, measurement)
-        X, P = np.asarray(found.memory[0]).ravel(), np.asarray(found.memory[1])
-        again = self._anew(X, P)
+        X, P = (np.asarray(part, dtype=float) for part in found.memory)
+        again = self._anew(np.clip(X.ravel(), *self._limits), P)
         if failed:
             return self._told(again, notes)
         return replace(self._told(again, notes), memory=replace(again, tape=step.window.tape))
@@ -176,17 +181,15 @@ class MovingHorizon:
             coarsest_s=self.coarsest_s,
         )
 
-    @property
+    @cached_property
     def _names(self) -> tuple[str, ...]:
         return (*self.plant.model.states, *self.unknown_inputs, *self.constants)
 
     @cached_property
     def _limits(self) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper bound of X, infinite where there is none."""
-        values, scale = self.plant.values, self.kalman.filter.scale
         ends = [self.bounds.get(name, (-inf, inf)) for name in self._names]
-        zero = [values[name] if name in self.constants else 0.0 for name in self._names]
-        lower, upper = (np.array(ends).T - zero) / scale
+        lower, upper = (np.array(ends).T - self._zero) / self._units
         return lower, upper
 
     @cached_property
@@ -201,17 +204,15 @@ class MovingHorizon:
 
     def _anew(self, X: np.ndarray, P: np.ndarray) -> Window:
         """A window that starts from what is known now."""
-        X, P = np.asarray(X, dtype=float).ravel(), np.asarray(P, dtype=float)
         return Window(self.functions.begun(X, P), X, P)
 
     def _stepped(self, window: Window, news: np.ndarray, begun: float) -> Step:
         """The window one sample later, after as many steps as there are passes and time."""
-        (_, d, p), functions = self.plant.nominal, self.functions
-        tape, told = called(functions.sample, window.tape, news, d, p)
-        step = self._accepted(tape, told[1:, 0], told[0, 0])
+        d, p = self._given
+        tape, told = self.functions.sample(window.tape, news, d, p)
+        step = self._accepted(tape, told[1:], told[0])
         if step is None:
-            (moved,) = called(functions.move, window.tape, news, d, p)
-            step = self._searched(moved)
+            step = self._searched(self.functions.move(window.tape, news, d, p)[0])
         for _ in range(self.passes - 1):
             if perf_counter() - begun > self.deadline_s:
                 break
@@ -220,13 +221,14 @@ class MovingHorizon:
 
     def _accepted(self, tape: np.ndarray, told: np.ndarray, before: float) -> Step | None:
         """The full step where it lowers the cost inside the bounds; else it is to be searched."""
-        after, P = told[0], told[1 + self._size :]
-        X = self.functions.part(tape[:, 0], "points")[:, -1]
-        if not after <= before * (1.0 + ROUNDING) + ROUNDING:  # false, too, for what is not finite
+        X = self.functions.part(tape, "points")[:, -1]
+        if (
+            not told[0] <= before * (1.0 + ROUNDING) + ROUNDING
+        ):  # false, too, where it is not finite
             return None
         if self.bounds and not ((self._limits[0] <= X) & (self._limits[1] >= X)).all():
             return None
-        return Step(Window(tape[:, 0], X, P.reshape(self._size, -1, order="F")), 1.0, False)
+        return Step(Window(tape, X, self._square(told[1 + len(X) :])), 1.0, False)
 
     def _searched(self, tape: np.ndarray) -> Step:
         """The longest of the halved steps that lowers the cost, held inside the bounds.
@@ -236,33 +238,63 @@ class MovingHorizon:
         LostError
             If none does.
         """
-        (_, d, p), functions, n = self.plant.nominal, self.functions, self._size
-        (lower, upper), tape = self._limits, np.ravel(tape)
-        aim, told = called(functions.solve, tape, np.zeros(n))
-        before, newest, P = told[0, 0], told[1 : n + 1, 0], told[n + 1 :].reshape(n, n, order="F")
+        d, p = self._given
+        functions, (lower, upper), n = self.functions, self._limits, len(self._names)
+        aim, told = functions.solve(tape, np.zeros(n))
+        before, newest, P = told[0], told[1 : n + 1], self._square(told[n + 1 :])
         if not np.isfinite(told).all():
             raise LostError("the linear problem is not finite")
         at = functions.part(tape, "points")[:, -1]
+        if ((at < lower) | (at > upper)).any():  # to come back inside may cost anything
+            before = inf
         bounded = bool(((at + newest < lower) | (at + newest > upper)).any())
         if bounded:
             _, push = nearest_inside(newest, P, lower - at, upper - at)
-            aim, _ = called(functions.solve, tape, push)
+            aim, _ = functions.solve(tape, push)
         for k in range(HALVINGS + 1):
             length = 0.5**k
-            tried, after = called(functions.run, tape + length * (aim[:, 0] - tape), d, p)
-            if after[0, 0] <= before * (1.0 + ROUNDING) + ROUNDING:
-                kept = tried[:, 0]
-                X = np.clip(functions.part(kept, "points")[:, -1], lower, upper)
-                return Step(Window(kept, X, P), length, bounded)
+            tried, after = functions.run(tape + length * (aim - tape), d, p)
+            if after[0] <= allowed(before):
+                X = np.clip(functions.part(tried, "points")[:, -1], lower, upper)
+                return Step(Window(tried, X, P), length, bounded)
         raise LostError("no step lowers the cost")
 
-    @property
-    def _size(self) -> int:
-        return len(self.kalman.filter.scale)
+    @cached_property
+    def _given(self) -> tuple[np.ndarray, np.ndarray]:
+        """Measured inputs and parameters, (n_d,) and (n_p,)."""
+        _, d, p = self.plant.nominal
+        return d.copy(), p.copy()
+
+    def _square(self, P: np.ndarray) -> np.ndarray:
+        return P.reshape(len(self._names), -1, order="F")
 
     def _told(self, window: Window, notes: Mapping[str, float]) -> Estimate:
-        found, values = self.kalman.estimate(window.X, window.P), self.plant.values
-        told = dict(found.notes)
-        for name in self.constants:
-            told[f"estimated {name}"] = values[name] + told.pop(f"unknown {name}")
-        return replace(found, memory=window, notes={**told, **notes})
+        """What the newest X of a window says."""
+        n = len(self.plant.model.states)
+        values = (window.X * self._units + self._zero).tolist()
+        told = dict(zip(self._notes, values[n:], strict=True))
+        covariance = window.P[:n, :n] * self._areas
+        state = np.array(values[:n])
+        return Estimate(self.plant.model.states, state, covariance, window, told | dict(notes))
+
+    @cached_property
+    def _units(self) -> np.ndarray:
+        return self.kalman.filter.scale
+
+    @cached_property
+    def _areas(self) -> np.ndarray:
+        """Units of the covariance of the states."""
+        n = len(self.plant.model.states)
+        return np.outer(self._units[:n], self._units[:n])
+
+    @cached_property
+    def _zero(self) -> np.ndarray:
+        """The values that X counts from: those of the parameters, else 0."""
+        values = self.plant.values
+        return np.array([values[n] if n in self.constants else 0.0 for n in self._names])
+
+    @cached_property
+    def _notes(self) -> tuple[str, ...]:
+        """Names under which unknown inputs and constants stand in the notes."""
+        unknown = (f"unknown {name}" for name in self.unknown_inputs)
+        return (*unknown, *(f"estimated {name}" for name in self.constants))

@@ -25,6 +25,7 @@ class WindowNodes:
     """The functions of one node; see :class:`Horizon` for the fields."""
 
     found: PlantFilter
+    constants: int
     loss: Loss
     coarsest_s: float
 
@@ -40,29 +41,85 @@ class WindowNodes:
 
     @cached_property
     def kick(self) -> np.ndarray:
-        """Root of half the variance that X gains in a sample, shape (n,)."""
-        return np.sqrt(self.found.step_covariance.diagonal() / 2.0)
+        """Root of half the variance that X gains in a sample, shape (n,); constants gain none."""
+        kick = np.sqrt(self.found.step_covariance.diagonal() / 2.0)
+        kick[self.n - self.constants :] = 0.0
+        return kick
 
     @cached_property
     def advance(self) -> ca.Function:
         """(X, noise, moved, u, d, p) -> (X, F) one sample later.
 
-        ``noise`` is (a, b) of the module; where ``moved`` is 0, X stays and F is the unit matrix.
+        ``noise`` is (a, b) of :mod:`estimators.horizon`; where ``moved`` is 0, X stays and F is the
+        unit matrix.  Steps whose error is too large are done again in finer ones, for X; F is that
+        of the coarse ones.
         """
-        model, n, S = self.found.plant.model, self.n, self.found.scale
-        n_x = len(model.states)
-        X, noise, moved = ca.MX.sym("X", n), ca.MX.sym("noise", 2 * n), ca.MX.sym("moved")
-        u, d, p = (ca.MX.sym(k, s.numel()) for k, s in zip("udp", model.symbols[1:], strict=True))
-        kicked = X + moved * self.kick * noise[:n]
-        real = S * kicked
-        later = ca.vertcat(self._step(real[:n_x], u, d, ca.vertcat(p, real[n_x:])), real[n_x:])
-        ahead = later / S + moved * self.kick * noise[n:]
-        slopes = self._slopes(real[:n_x], u, d, ca.vertcat(p, real[n_x:]))
-        slopes = slopes * np.outer(1.0 / S[:n_x], S)
-        F = ca.vertcat(slopes, ca.horzcat(ca.MX(n - n_x, n_x), ca.MX.eye(n - n_x)))
+        trial = self._trial
+        symbols = [ca.MX.sym(f"i{k}", *trial.size_in(k)) for k in range(trial.n_in())]
+        X, F = ca.MX.sym("X", self.n), ca.MX.sym("F", self.n, self.n)
+        keep = ca.Function("keep", [X, *symbols], [X])
+        again = ca.Function("again", [X, *symbols], [self._refined(*symbols)])
+        X, F, passes = trial(*symbols)
+        X = ca.Function.if_else("chosen", keep, again)(passes, X, *symbols)
+        return ca.Function("advance", symbols, [X, F])
+
+    @cached_property
+    def _trial(self) -> ca.Function:
+        """(X, noise, moved, u, d, p) -> (X, F, true where no step has to be done again)."""
+        symbols, rates = self._rates
+        x, u, d, pw = symbols
+        steps = steps_of(self.found.sample_time_s, self.coarsest_s)
+        n_p, n_x = len(self.found.plant.model.parameters), len(self.found.plant.scale)
+        later, error = single_step(symbols, rates)(*symbols, self.found.sample_time_s / steps)
+        small = ca.sumsqr(error / self.found.plant.model.tolerances) < 1.0
+        by = [ca.densify(ca.jacobian(later, v)) for v in (x, pw[n_p:])]
+        once = ca.Function("once", [*symbols], [later, *by, small], {"cse": True})
+        kind = ca.SX if steps == 1 else ca.MX  # several are a chain of calls, or the code is long
+        X, noise, moved, u, d, p, kicked = self._inputs(kind)
+        real = ca.DM(self.found.scale) * kicked
+        now, w, passes, carried = real[:n_x], real[n_x:], 1.0, None
+        for _ in range(steps):
+            now, by_x, by_w, small = once(now, u, d, ca.vertcat(p, w))
+            passes = passes * small
+            if carried is None:
+                carried = ca.horzcat(by_x, by_w)
+            else:
+                carried = by_x @ carried + ca.horzcat(kind(n_x, n_x), by_w)
+        return ca.Function(
+            "trial",
+            [X, noise, moved, u, d, p],
+            [*self._scaled(X, noise, moved, ca.vertcat(now, w), carried), passes],
+            {"cse": True},
+        )
+
+    def _inputs(self, kind: type) -> list:
+        """Symbols X, noise, moved, u, d, p, and X with the first half of the noise."""
+        n, (_, *inputs) = self.n, self.found.plant.model.symbols
+        X, noise, moved = kind.sym("X", n), kind.sym("noise", 2 * n), kind.sym("moved")
+        u, d, p = (kind.sym(k, s.numel()) for k, s in zip("udp", inputs, strict=True))
+        return [X, noise, moved, u, d, p, X + moved * ca.DM(self.kick) * noise[:n]]
+
+    def _scaled(self, X, noise, moved, later, slopes) -> list:
+        """X and F in scaled units from what follows on (x, w), and its slopes in (x, w)."""
+        n, n_x, S = self.n, len(self.found.plant.scale), self.found.scale
+        ahead = later / ca.DM(S) + moved * ca.DM(self.kick) * noise[n:]
         still = 1.0 - moved
-        results = [moved * ahead + still * X, ca.densify(moved * F + still * ca.MX.eye(n))]
-        return ca.Function("advance", [X, noise, moved, u, d, p], results)
+        unit = ca.DM.eye(n)
+        F = ca.vertcat(slopes * ca.DM(np.outer(1.0 / S[:n_x], S)), ca.densify(unit[n_x:, :]))
+        return [moved * ahead + still * X, ca.densify(moved * F + still * unit)]
+
+    @cached_property
+    def _refined(self) -> ca.Function:
+        """(X, noise, moved, u, d, p) -> X with as fine steps as it takes."""
+        n_x, S = len(self.found.plant.scale), ca.DM(self.found.scale)
+        X, noise, moved, u, d, p, kicked = self._inputs(ca.MX)
+        real = S * kicked
+        dt, tolerances = self.found.sample_time_s, self.found.plant.model.tolerances
+        step = controlled_step(*self._rates, dt, tolerances, self.coarsest_s)
+        later = ca.vertcat(step(real[:n_x], u, d, ca.vertcat(p, real[n_x:])), real[n_x:])
+        ahead = later / S + moved * ca.DM(self.kick) * noise[self.n :]
+        results = [moved * ahead + (1.0 - moved) * X]
+        return ca.Function("refined", [X, noise, moved, u, d, p], results)
 
     @cached_property
     def see(self) -> ca.Function:
@@ -173,33 +230,3 @@ class WindowNodes:
         rates = ca.substitute(model.rates, p, p + ca.DM(self._walking) @ w)
         rates += ca.DM(np.array(entering).reshape(x.numel(), -1)) @ w
         return (x, u, d, ca.vertcat(p, w)), rates
-
-    @cached_property
-    def _step(self) -> ca.Function:
-        """(x, u, d, (p, w)) -> x one sample later; steps whose error is too large are refined."""
-        dt, tolerances = self.found.sample_time_s, self.found.plant.model.tolerances
-        return controlled_step(*self._rates, dt, tolerances, self.coarsest_s)
-
-    @cached_property
-    def _slopes(self) -> ca.Function:
-        """(x, u, d, (p, w)) -> derivative of x one sample later in x and w, shape (n_x, n).
-
-        Exact where no step has to be refined.
-        """
-        (x, u, d, pw), rates = self._rates
-        steps = steps_of(self.found.sample_time_s, self.coarsest_s)
-        n_p = len(self.found.plant.model.parameters)
-        later, _ = single_step((x, u, d, pw), rates)(x, u, d, pw, self.found.sample_time_s / steps)
-        results = [later, *(ca.densify(ca.jacobian(later, v)) for v in (x, pw))]
-        results[2] = results[2][:, n_p:]
-        once = ca.Function("once", [x, u, d, pw], results, {"cse": True})
-        at, u, d, pw = (ca.MX.sym(k, s.numel()) for k, s in zip("xudp", (x, u, d, pw), strict=True))
-        now, slopes = at, None
-        for _ in range(steps):
-            now, by_x, by_w = once(now, u, d, pw)
-            carried = ca.horzcat(by_x, by_w)
-            if slopes is not None:
-                entered = ca.horzcat(ca.MX(x.numel(), x.numel()), by_w)
-                carried = by_x @ slopes + entered
-            slopes = carried
-        return ca.Function("slopes", [at, u, d, pw], [slopes])
