@@ -185,10 +185,15 @@ class Horizon:
         return shifted | dict(prior=prior, handed=prior)
 
     def _arrived(self, old: Parts) -> ca.MX:
-        """Prior of the second node; constants are known from the last estimate, less movement."""
-        free = self.at.n - self.constants
+        """Prior of the second node.
+
+        Constants are known from the last estimate, less movement.  Bristles are where the path has
+        them: bent along a tangent by what the prior does not know, they would bend too far.
+        """
+        free, bound = self.at.n - self.constants, ca.DM(self.found.corrected)
         mean, P = old["handed"][:, 0], old["handed"][:, 1:]
-        P = P + old["moved"][0] * ca.diag(ca.DM(self.arrival))
+        mean = bound * mean + (1.0 - bound) * old["points"][:, 1]
+        P = (P + old["moved"][0] * ca.diag(ca.DM(self.arrival))) * (bound @ bound.T)
         movement = self.found.sample_time_s * ca.DM.eye(self.constants)
         mean = ca.vertcat(mean[:free], old["points"][free:, -1])
         return ca.horzcat(mean, ca.densify(ca.diagcat(P[:free, :free], movement)))
@@ -209,9 +214,7 @@ class Horizon:
         adjoints, noise = self.at.backward.mapaccum("backward", M - 1, 1)(
             adjoint, *map(self._reversed, every)
         )
-        free = ca.DM(self.found.corrected)
         start = now["prior"][:, 0] + now["prior"][:, 1:] @ adjoints[:, -1]
-        start = free * start + (1.0 - free) * points[:, 0]
         handed = ca.horzcat(points[:, 1] + ahead[:, 0], ahead[:, 1:width])
         later = dict(points=ca.horzcat(start, points[:, 1:]), noise=self._reversed(noise))
         told = self._cost(now), newest[:, 0], newest[:, 1:]

@@ -151,9 +151,9 @@ class WindowNodes:
             Ph = P @ h
             variance = 1.0 + ca.dot(h, Ph)
             e = (root[j] * error[j] - ca.dot(h, d)) / variance
-            K = ca.SX(ca.DM(self.found.corrected)) * Ph / variance
+            K = Ph / variance
             d = d + variance * e * K
-            P = P - K @ Ph.T - Ph @ K.T + variance * (K @ K.T)
+            P = P - K @ Ph.T
             gains.append(ca.vertcat(e, root[j], K))
         results = [ca.densify(ca.horzcat(d, P)), ca.densify(ca.horzcat(*gains))]
         return ca.Function("correct", [dP, error, received, H], results, {"cse": True})

@@ -1,0 +1,91 @@
+"""The record of paper 004 once more: steps, quick steps, and a vent that the spool refuses.
+
+The true bellows has a spool that sticks: its vent opens only below 0.45 of the command, 0.03 below
+where it should.  Steps to all other levels are as they should be; late in the record the command
+stands just below the centre for five seconds, and the bellows does not vent.
+
+Source: paper 004, Fig. 7 to 10 (steps for more than 250 s, quick steps near 150 s, the event after
+250 s); physics.md 7 for the size of the event.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from studies.truth.batch import stack
+from studies.truth.case import generator
+from studies.truth.cases import read_cases
+from studies.truth.instruments import quantised
+from studies.truth.plants import SOFT_JOINT
+from studies.truth.soft_joint_draw import joint_of
+from studies.truth.soft_joint_manoeuvre import NEUTRAL, RATE_HZ
+from studies.truth.soft_joint_record import (
+    COMMAND_STEP,
+    PRESSURE_NOISE_PA,
+    PRESSURE_STEP_PA,
+    run,
+)
+
+HIDDEN = "valve_stuck_band"
+STUCK_SHARE = 0.03
+EVENT_COMMAND, EVENT_S, FILL_S = 0.478, 5.0, 3.0
+QUICK_PART, EVENT_PART = (0.45, 0.62), 0.78  # shares of the record
+
+
+@dataclass(frozen=True)
+class EventRecord:
+    """A record and where its event is.
+
+    table      time_s, command (0 to 1), pressure_bar and supply_bar as recorded
+    event      first and last sample of the event
+    """
+
+    table: Mapping[str, np.ndarray]
+    event: tuple[int, int]
+
+
+def event_record(duration_s: float, seed: int) -> EventRecord:
+    """A record of so many seconds at 400 Hz; the differences of the bellows are always the same."""
+    case = read_cases(SOFT_JOINT.stored)[HIDDEN, 1]
+    joint = replace(joint_of(case), stuck_band_share=STUCK_SHARE)
+    wanted, event = event_command(duration_s, generator(HIDDEN, seed, "event"))
+    command = quantised(wanted, COMMAND_STEP)
+    readings, _ = run(stack([joint]), command[:, None])
+    random = generator(HIDDEN, seed, "event noise")
+    noise = PRESSURE_NOISE_PA * random.standard_normal((2, len(command)))
+    seen = [readings[name][:, 0] for name in ("pressure_pa", "supply_pa")] + noise
+    own, supply = 1e-5 * quantised(seen, PRESSURE_STEP_PA)
+    time_s = np.arange(len(command)) / RATE_HZ
+    table = dict(time_s=time_s, command=command, pressure_bar=own, supply_bar=supply)
+    return EventRecord(table, event)
+
+
+def event_command(
+    duration_s: float, rng: np.random.Generator
+) -> tuple[np.ndarray, tuple[int, int]]:
+    """Levels from 0 to 1, shape (n,), and first and last sample of the event."""
+    n = round(duration_s * RATE_HZ)
+    quick = [round(share * n) for share in QUICK_PART]
+    fill, start = (round(EVENT_PART * n - s * RATE_HZ) for s in (FILL_S, 0.0))
+    end = start + round(EVENT_S * RATE_HZ)
+    parts = [
+        _steps(rng, quick[0], 1.0, 3.0),
+        _steps(rng, quick[1] - quick[0], 0.1, 0.4),
+        _steps(rng, fill - quick[1], 1.0, 3.0),
+        np.full(start - fill, 0.62),
+        np.full(end - start, EVENT_COMMAND),
+        _steps(rng, n - end, 1.0, 3.0),
+    ]
+    return np.concatenate(parts), (start, end)
+
+
+def _steps(rng: np.random.Generator, samples: int, shortest_s: float, longest_s: float):
+    """Fills, vents and pauses in turn, none where the spool sticks."""
+    levels: list[np.ndarray] = []
+    while sum(map(len, levels)) < samples:
+        fill, vent = rng.uniform(0.53, 0.62), rng.uniform(0.38, 0.44)
+        for level in rng.permutation([fill, vent, NEUTRAL]):
+            held = round(rng.uniform(shortest_s, longest_s) * RATE_HZ)
+            levels.append(np.full(held, level))
+    return np.concatenate(levels)[:samples]
