@@ -8,7 +8,7 @@ Source: paper 004, Fig. 7 to 10 (steps for more than 250 s, quick steps near 150
 250 s); physics.md 7 for the size of the event.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -45,20 +45,29 @@ class EventRecord:
     event: tuple[int, int]
 
 
-def event_record(duration_s: float, seed: int) -> EventRecord:
-    """A record of so many seconds at 400 Hz; the differences of the bellows are always the same."""
+def event_records(duration_s: float, seeds: Sequence[int]) -> list[EventRecord]:
+    """Records of so many seconds at 400 Hz, one for each seed, of one bellows, in one batch."""
     case = read_cases(SOFT_JOINT.stored)[HIDDEN, 1]
     joint = replace(joint_of(case), stuck_band_share=STUCK_SHARE)
-    wanted, event = event_command(duration_s, generator(HIDDEN, seed, "event"))
-    command = quantised(wanted, COMMAND_STEP)
-    readings, _ = run(stack([joint]), command[:, None])
+    wanted = [event_command(duration_s, generator(HIDDEN, seed, "event")) for seed in seeds]
+    command = quantised(np.stack([each for each, _ in wanted], axis=1), COMMAND_STEP)
+    readings, _ = run(stack([joint] * len(seeds)), command)
+    return [
+        EventRecord(_table(readings, command, k, seed), event)
+        for k, (seed, (_, event)) in enumerate(zip(seeds, wanted, strict=True))
+    ]
+
+
+def _table(
+    readings: Mapping[str, np.ndarray], command: np.ndarray, column: int, seed: int
+) -> dict[str, np.ndarray]:
     random = generator(HIDDEN, seed, "event noise")
     noise = PRESSURE_NOISE_PA * random.standard_normal((2, len(command)))
-    seen = [readings[name][:, 0] for name in ("pressure_pa", "supply_pa")] + noise
+    seen = [readings[name][:, column] for name in ("pressure_pa", "supply_pa")] + noise
     own, supply = 1e-5 * quantised(seen, PRESSURE_STEP_PA)
     time_s = np.arange(len(command)) / RATE_HZ
-    table = dict(time_s=time_s, command=command, pressure_bar=own, supply_bar=supply)
-    return EventRecord(table, event)
+    table = dict(time_s=time_s, command=command[:, column], pressure_bar=own)
+    return {**table, "supply_bar": supply}
 
 
 def event_command(
