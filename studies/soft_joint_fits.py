@@ -1,8 +1,8 @@
 """The soft joint of paper 004 on records: its two models, and how the paper fits them.
 
 First principles are fitted by kappa and the discharge coefficients of filling and venting, bounded,
-from several starts (SLSQP on the mean square of a free run, as in the paper); the parametric model
-by its time constant alone.
+from several starts (SLSQP and Nelder-Mead on the mean square of a free run, as in the paper); the
+parametric model by its time constant alone.
 
 Source: paper 004, Figs. 7 and 8; S004-3 and S004-4 of physics.md 5.
 """
@@ -159,27 +159,24 @@ def values_of(kappa: float, filling: float, venting: float) -> dict[str, float]:
     return {KAPPA: kappa, C: mean, ASYMMETRY: (filling - venting) / (filling + venting)}
 
 
-def several_starts(plant: Plant, recording: Recording, number: int) -> list[Fitted]:
-    """Bounded searches for kappa, C of filling and of venting from random starts, best first."""
+def several_starts(plant: Plant, recording: Recording, method: str, number: int) -> list[Fitted]:
+    """Bounded searches for kappa, C of filling and of venting, best first.
+
+    ``method`` is scipy's name of the search; the random starts are always the same.
+    """
     run, rng = FreeRun(plant, recording), np.random.default_rng(4)
     bounds = np.array([KAPPA_BOUNDS, C_BOUNDS, C_BOUNDS])
-    wide = np.ptp(bounds, axis=1)
 
-    def real(unit: np.ndarray) -> np.ndarray:
-        return bounds[:, 0] + wide * np.clip(unit, 0.0, 1.0)
+    def squared(found: np.ndarray) -> float:
+        return run.rmse_psi(values_of(*np.clip(found, *bounds.T))) ** 2
 
     found = []
     for _ in range(number):
-        start = rng.uniform(size=3)
-        ended = minimize(
-            lambda unit: run.rmse_psi(values_of(*real(unit))) ** 2,
-            start,
-            method="SLSQP",
-            bounds=[(0.0, 1.0)] * 3,
-            options={"maxiter": 100, "ftol": 1e-8, "eps": 1e-5},
-        )
-        end = tuple(real(ended.x).tolist())
-        found.append(Fitted(tuple(real(start).tolist()), end, run.rmse_psi(values_of(*end))))
+        start = rng.uniform(*bounds.T)
+        ended = minimize(squared, start, method=method, bounds=bounds.tolist())
+        end = np.clip(ended.x, *bounds.T)
+        error_psi = float(np.sqrt(squared(end)))
+        found.append(Fitted(tuple(start.tolist()), tuple(end.tolist()), error_psi))
     return sorted(found, key=lambda each: each.rmse_psi)
 
 
