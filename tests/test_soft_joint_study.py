@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import studies.soft_joint_fits as soft_joint_fits
 from estimators.losses import Huber
 from studies.paper_004 import PAPER, settings
 from studies.soft_joint_fits import (
@@ -35,6 +36,7 @@ from studies.truth.soft_joint_event import (
     EVENT_COMMAND,
     EVENT_S,
     STUCK_SHARE,
+    EventRecord,
     event_command,
     event_records,
 )
@@ -67,8 +69,9 @@ def test_the_record_steps_where_the_spool_moves_and_the_event_where_it_sticks(se
     assert np.flatnonzero(np.diff(command)).size > 20
 
 
+@pytest.mark.slow
 def test_the_true_bellows_does_not_vent_in_the_event():
-    (made,) = event_records(12.0, [1])
+    (made,) = event_records(20.0, [1])
     first, last = made.event
     pressure = 1e5 * made.table["pressure_bar"]
 
@@ -76,13 +79,25 @@ def test_the_true_bellows_does_not_vent_in_the_event():
     assert pressure[first] > 5e5
 
 
-def test_records_are_kept_and_read_back(tmp_path, monkeypatch):
-    made = recorded(12.0, tmp_path / "records.npz")
-    monkeypatch.setattr("studies.soft_joint_fits.event_records", None)  # not called again
-    again = recorded(12.0, tmp_path / "records.npz")
+def test_a_record_too_short_for_its_event_is_refused():
+    with pytest.raises(ValueError, match="a record of 12 s is too short, expected 20 s or more"):
+        event_command(12.0, np.random.default_rng(0))
 
-    assert again.event == made.event and again.nominal.sum() == made.nominal.sum()
-    np.testing.assert_array_equal(again.judged[PRESSURE], made.judged[PRESSURE])
+
+def test_records_are_kept_and_read_back(tmp_path, monkeypatch):
+    def made(duration_s, seeds):
+        n = round(duration_s / SAMPLE_TIME_S)
+        columns = ("time_s", "command", "pressure_bar", "supply_bar")
+        return [EventRecord({c: np.full(n, float(k)) for c in columns}, (5, 9)) for k in seeds]
+
+    monkeypatch.setattr(soft_joint_fits, "event_records", made)
+    first = recorded(3.0, tmp_path / "records.npz")
+    monkeypatch.setattr(soft_joint_fits, "event_records", None)  # not called again
+    again = recorded(3.0, tmp_path / "records.npz")
+
+    assert again.event == first.event == (5, 9)
+    assert again.judged[PRESSURE] == pytest.approx(3e5) and len(again.other) == 1200
+    assert again.nominal.sum() == 5  # the mark of the event outlasts the record
 
 
 def test_the_coefficients_are_those_of_filling_and_of_venting():
@@ -93,7 +108,7 @@ def test_the_coefficients_are_those_of_filling_and_of_venting():
 
 
 def test_a_search_finds_the_coefficients_of_a_record_of_the_model_itself():
-    """With kappa free: along the valley that the study shows, the product of both is what counts."""
+    """With kappa free they do so along the valley that the study shows: their ratio is found."""
     plant = first_principles()
     truth = values_of(1.4, 0.8, 0.5)
     own = record_of(plant.with_values(truth), steps())
@@ -132,13 +147,13 @@ def tracked_jump():
     pressure = free_run(parametric(), blank, taus)
     noisy = pressure + 1e3 * np.random.default_rng(2).standard_normal(n)
     record = Recording("jump", SAMPLE_TIME_S, {COMMAND: u, PRESSURE: noisy})
-    data = Data(record, record, record, (n // 2, n // 2 + 100))
+    data = Data(record, record, record, (n // 2, n))
     setting = Setting(horizon=100)
     return data, taus, *tracked(parametric(), record, setting)
 
 
 def test_a_horizon_follows_a_time_constant_that_jumps(tracked_jump):
-    data, taus, found, lost = tracked_jump
+    _, taus, found, lost = tracked_jump
     late = np.r_[200 : len(taus) // 2, len(taus) // 2 + 200 : len(taus)]
 
     assert lost == 0
@@ -151,8 +166,11 @@ def test_its_estimate_makes_a_free_run_and_predictions_better(tracked_jump):
     fixed, own = (worth(plant, data, t) for t in (np.full(len(taus), 0.05), found))
     ends, errors = ahead(plant, data.judged, taus)
 
-    assert own.event_psi < fixed.event_psi and own.nominal_psi < fixed.nominal_psi
-    assert np.sqrt(np.mean(errors**2)) < 3.0 * 1e3 and ends[0] == 400
+    assert own.event_psi < 0.7 * fixed.event_psi
+    assert own.event_rmse_psi < 0.7 * fixed.event_rmse_psi
+    assert own.ahead_event_psi < 0.7 * fixed.ahead_event_psi
+    one = (ends <= len(taus) // 2) | (ends - 400 >= len(taus) // 2)  # time constant all the way
+    assert np.sqrt(np.mean(errors[one] ** 2)) < 3.0 * 1e3 and ends[0] == 400
 
 
 def test_a_shift_in_time_is_found_as_lag():

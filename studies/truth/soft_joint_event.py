@@ -30,6 +30,7 @@ from studies.truth.soft_joint_record import (
 HIDDEN = "valve_stuck_band"
 STUCK_SHARE = 0.03
 EVENT_COMMAND, EVENT_S, FILL_S = 0.478, 5.0, 3.0
+SHORTEST_S = 20.0  # of a record
 QUICK_PART, EVENT_PART = (0.45, 0.62), 0.78  # shares of the record
 
 
@@ -73,7 +74,14 @@ def _table(
 def event_command(
     duration_s: float, rng: np.random.Generator
 ) -> tuple[np.ndarray, tuple[int, int]]:
-    """Levels from 0 to 1, shape (n,), and first and last sample of the event."""
+    """Levels from 0 to 1, shape (n,), and first and last sample of the event.
+
+    Raises ValueError for a record that has no room for its parts.
+    """
+    if duration_s < SHORTEST_S:
+        raise ValueError(
+            f"a record of {duration_s:g} s is too short, expected {SHORTEST_S:g} s or more"
+        )
     n = round(duration_s * RATE_HZ)
     quick = [round(share * n) for share in QUICK_PART]
     fill, start = (round(EVENT_PART * n - s * RATE_HZ) for s in (FILL_S, 0.0))
