@@ -127,10 +127,10 @@ class Horizon:
 
     @cached_property
     def move(self) -> Call:
-        """(tape, news, d, p) -> the tape one sample later, before a step."""
+        """(tape, news, d, p) -> the tape one sample later, before a step; rare, so not compiled."""
         tape, news, d, p = self._symbols("tape", "news", "d", "p")
         results = [self._tape(self._moved(tape, news, d, p))]
-        return _ready("mhe_move", [tape, news, d, p], results)
+        return prepared(ca.Function("mhe_move", [tape, news, d, p], results))
 
     @cached_property
     def solve(self) -> Call:

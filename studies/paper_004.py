@@ -20,6 +20,8 @@ from estimators.losses import Absolute, Huber
 from studies.kept import Kept
 from studies.paper_004_figures import figures
 from studies.soft_joint_fits import (
+    FITTED_S,
+    PSI_PA,
     Data,
     Fitted,
     FreeRun,
@@ -36,9 +38,9 @@ from studies.text import columns, number
 from workbench.plant import Plant
 from workbench.plants.soft_joint import PRESSURE
 
-DURATION_S = {Extent.QUICK: 30.0, Extent.FULL: 300.0}
+DURATION_S = {Extent.QUICK: FITTED_S, Extent.FULL: 300.0}
 STARTS = {Extent.QUICK: 4, Extent.FULL: 16}
-HORIZONS = {Extent.QUICK: (40, 400), Extent.FULL: (40, 100, 200, 400)}
+HORIZONS = (40, 100, 200, 400)
 MOVEMENTS_S = {Extent.QUICK: (1e-4, 1e-3), Extent.FULL: (3e-5, 1e-4, 1e-3, 1e-2)}
 PAPER = Setting()
 TIGHT = Setting(bounds_s=(0.03, 0.3))
@@ -46,6 +48,8 @@ LOSSES = (Setting(loss=Huber()), Setting(loss=Absolute()))
 CORRECTED, SIMPLEX, PRINTED = "SLSQP", "Nelder-Mead", "SLSQP, as printed (E004-1)"
 SEARCHES = {CORRECTED: "SLSQP", SIMPLEX: "Nelder-Mead", PRINTED: "SLSQP"}  # scipy's names
 FIXED, SEARCHED, BARE = "tau fixed", "flows, searched", "flows, data sheet"
+IMPROVED = {"soft_joint": "flows, improved", "soft_joint_parametric": "tau, improved"}  # by plant
+
 HALF, EMPTY_PSI, APART, CLOSE = 0.5, 16.5, 0.2, 0.02
 
 
@@ -68,8 +72,8 @@ def run(folder: Path, extent: Extent, say: Callable[[str], None]) -> Outcome:
     fixed = model.with_values({"valve.time_constant_s": tau_s})
     taus, lost = {}, {}
     for setting in settings(extent):
-        file = work / f"tau_{extent.value}_{len(taus)}.npy"
-        if setting.name not in kept:
+        file = work / f"tau_{extent.value}_{setting.slug}.npy"
+        if setting.name not in kept or not file.exists():
             say(setting.name)
             found_s, fallbacks = tracked(fixed, data.judged, setting)
             np.save(file, found_s)
@@ -80,8 +84,8 @@ def run(folder: Path, extent: Extent, say: Callable[[str], None]) -> Outcome:
         key = f"improve {plant.name}"
         if key not in kept:
             say(key)
-            kept.add(key, asdict(improved(plant.name, data, say)))
-        better[plant.name] = Improved(**kept.rows[key])
+            kept.add(key, {"found": asdict(improved(plant.name, say))})
+        better[plant.name] = Improved(**kept.rows[key]["found"])
     return outcome(data, fixed, searches, taus, lost, better)
 
 
@@ -90,7 +94,7 @@ def settings(extent: Extent) -> list[Setting]:
     grid = [
         Setting(horizon=horizon, movement_s=movement)
         for movement in MOVEMENTS_S[extent]
-        for horizon in HORIZONS[extent]
+        for horizon in HORIZONS
     ]
     return list(dict.fromkeys([PAPER, *grid, TIGHT, *LOSSES]))
 
@@ -111,7 +115,7 @@ def outcome(
         **{setting.name: worth(fixed, data, found) for setting, found in taus.items()},
         BARE: _of_plant(data, first_principles(), {}),
         SEARCHED: _of_plant(data, first_principles(), best.values),
-        **{f"{name}, improved": _improved_worth(data, name, b) for name, b in better.items()},
+        **{IMPROVED[name]: _of_plant(data, b.plant(name), {}) for name, b in better.items()},
     }
     wanted = needed(fixed, first_principles(), data.judged)
     late = {setting.name: lags(data, found, wanted) for setting, found in taus.items()}
@@ -119,7 +123,7 @@ def outcome(
     claims = tuple(_claims(rows, searches, emptied, late, better))
     numbers = {
         "tau_s": tau_s,
-        "errors_psi": {name: asdict(row) for name, row in rows.items()},
+        "errors_psi": {name: _plain(asdict(row)) for name, row in rows.items()},
         "lag_s": late,
         "fallbacks": {setting.name: count for setting, count in lost.items()},
         "searches": {name: [asdict(each) for each in found] for name, found in searches.items()},
@@ -130,21 +134,22 @@ def outcome(
     return Outcome(_text(tau_s, rows, late, searches, better), claims, drawn, numbers)
 
 
+def _plain(numbers: Mapping[str, float]) -> dict[str, float | None]:
+    """Numbers as JSON knows them: None stands for NaN."""
+    return {name: value if np.isfinite(value) else None for name, value in numbers.items()}
+
+
 def _of_plant(data: Data, plant: Plant, values: Mapping[str, float]) -> Worth:
     """A free run; predictions are those of the paper's model alone, and stand as NaN."""
-    row = worth_of(data, FreeRun(plant, data.judged)(values), *2 * (np.zeros(0, dtype=int),))
-    return row
-
-
-def _improved_worth(data: Data, name: str, found: Improved) -> Worth:
-    return _of_plant(data, found.plant(name), {})
+    none = np.zeros(0, dtype=int)
+    return worth_of(data, FreeRun(plant, data.judged)(values), none, none)
 
 
 def _emptied_psi(data: Data, name: str, best: Fitted) -> float:
-    """The highest pressure of the best fit where the training record is vented."""
+    """Mean pressure of the best fit where the training record has none left."""
     run = FreeRun(first_principles(as_printed=name == PRINTED), data.training)
-    vented = data.training[PRESSURE] < EMPTY_PSI * 6894.757
-    return float(run(best.values)[vented].max() / 6894.757)
+    empty = data.training[PRESSURE] < EMPTY_PSI * PSI_PA
+    return float(run(best.values)[empty].mean() / PSI_PA)
 
 
 def _claims(
@@ -162,16 +167,20 @@ def _claims(
     lag = late[PAPER.name]
     told = ", ".join(f"{kind} {value:.2f} s" for kind, value in lag.items())
     yield Claim("its time constant lags at edges, by 0.1 s and more", told, min(lag.values()) > 0.1)
-    short = rows[Setting(horizon=HORIZONS[Extent.QUICK][0]).name]
+    short = rows[Setting(horizon=HORIZONS[0]).name]
     trades = short.nominal_psi < horizon.nominal_psi and short.event_psi > horizon.event_psi
     told = (
         f"0.1 s: event {short.event_psi:.1f}, else {short.nominal_psi:.1f} psi; "
         f"1 s: {horizon.event_psi:.1f} and {horizon.nominal_psi:.1f} psi"
     )
     yield Claim("a shorter horizon is better outside the event and worse in it", told, trades)
-    told = f"{emptied[PRINTED]:.0f} psi where the record is empty; {emptied[CORRECTED]:.0f} with it"
-    claim = "without the molar mass the fitted flows stay too slow (paper: 40 psi)"
-    yield Claim(claim, told, emptied[PRINTED] > 2.0 * emptied[CORRECTED])
+    rmse = {name: found[0].rmse_psi for name, found in searches.items()}
+    told = (
+        f"mean {emptied[PRINTED]:.0f} psi where the record is empty, with it "
+        f"{emptied[CORRECTED]:.0f}; RMS {rmse[PRINTED]:.0f} and {rmse[CORRECTED]:.0f} psi"
+    )
+    claim = "without the molar mass the fitted flows stay too slow, RMS twice as large"
+    yield Claim(claim, told, rmse[PRINTED] > 2.0 * rmse[CORRECTED])
     ends = [*searches[CORRECTED], *searches[SIMPLEX]]
     kappas, errors = (
         [pick(e) for e in ends] for pick in (lambda e: e.end[0], lambda e: e.rmse_psi)
@@ -181,7 +190,7 @@ def _claims(
     claim = f"searches end at several kappa and C, {APART:g} apart, with errors within {CLOSE:.0%}"
     yield Claim(claim, told, np.ptp(kappas) > APART and more < CLOSE)
     name = "soft_joint"
-    fine = rows[f"{name}, improved"]
+    fine = rows[IMPROVED[name]]
     yield Claim(
         f"improve adds {STUCK} to the flows", ", ".join(better[name].kept) or "nothing",
         STUCK in better[name].kept,
@@ -218,7 +227,7 @@ def _text(
         ends = [(f"{x:.3g}" for x in (*f.start, *f.end, f.rmse_psi)) for f in found]
         head = ("kappa from", "C filling", "C venting", "kappa to", "C filling", "C venting", "psi")
         parts += [f"searches on the flows {name}:\n{columns(head, [tuple(e) for e in ends])}"]
-    parts += [f"{name}: {found.sentence}" for name, found in better.items()]
+    parts += [f"{IMPROVED[name]}: {found.sentence}" for name, found in better.items()]
     return "\n\n".join(parts)
 
 

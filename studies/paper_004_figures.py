@@ -109,6 +109,6 @@ def _trade_off(taus: Mapping[Setting, np.ndarray], rows: Mapping[str, Worth]) ->
     marked = {
         name: (row.nominal_psi, row.event_psi)
         for name, row in rows.items()
-        if name == "tau fixed" or name.endswith("improved")
+        if name in ("tau fixed", "flows, improved", "tau, improved")
     }
     return trade_off_figure(curves, marked)

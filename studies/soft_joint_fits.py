@@ -40,19 +40,19 @@ KAPPA, C, ASYMMETRY = (
     "valve.discharge_asymmetry",
 )
 KAPPA_BOUNDS, C_BOUNDS, TAU_BOUNDS = (1.05, 1.67), (0.3, 1.0), (0.01, 0.5)
-TRAINING, OTHER, JUDGED = 1, 2, 3  # seeds
+TRAINING, JUDGED = 1, 3  # seeds
+FITTED_S = 30.0  # of the record that models are fitted on
 AFTER_S = 4.0  # of the event's mark on a free run
 
 
 @dataclass(frozen=True)
 class Data:
-    """Three records of one bellows: to fit and improve on, to hold out, and to judge all on.
+    """Two records of one bellows: to fit on, and to judge all on.
 
-    event    first and last sample of the event in the last one
+    event    first and last sample of the event in the second one
     """
 
     training: Recording
-    other: Recording
     judged: Recording
     event: tuple[int, int]
 
@@ -80,10 +80,12 @@ class Fitted:
 
 
 def recorded(duration_s: float, file: Path) -> Data:
-    """The three records; the truth takes minutes, so they are kept in a file."""
-    names = ("training", "other", "judged")
+    """Both records, the second of so many seconds; the truth takes minutes, so they are kept."""
+    names = ("training", "judged")
     if not file.exists():
-        made = event_records(duration_s, (TRAINING, OTHER, JUDGED))
+        batches = {FITTED_S: [TRAINING]}
+        batches[duration_s] = [*batches.get(duration_s, []), JUDGED]
+        made = [r for length, seeds in batches.items() for r in event_records(length, seeds)]
         columns = {
             f"{name} {key}": value
             for name, record in zip(names, made, strict=True)
@@ -100,12 +102,12 @@ def recorded(duration_s: float, file: Path) -> Data:
             )
             for name in names
         ]
-    channels = [_recording(r, n) for r, n in zip(records, names, strict=True)]
+    channels = [recording(r.table, n) for r, n in zip(records, names, strict=True)]
     return Data(*channels, records[-1].event)
 
 
-def _recording(record: EventRecord, name: str) -> Recording:
-    table = record.table
+def recording(table: Mapping[str, np.ndarray], name: str) -> Recording:
+    """A table of the truth in SI units and the plant's signals."""
     channels = {
         COMMAND: table["command"],
         PRESSURE: 1e5 * table["pressure_bar"],

@@ -24,7 +24,8 @@ from workbench.recording import Recording
 
 NOISE_PA, START_PA = 1e3, 1e5  # of the sensor; of a window's start, by root of a second
 AHEAD, EVERY = 400, 40  # samples of a prediction, and from one to the next
-MOVING_PA_S = 2e4  # above which a rate tells a time constant
+MOVING_PA_S = 5e4  # above which a rate tells a time constant
+SMOOTHED = 9  # samples whose mean stands for the pressure there
 LONGEST_LAG_S, EDGE_S = 1.2, 1.0  # of a shift tried; how much after an edge counts
 
 
@@ -44,6 +45,11 @@ class Setting:
             f"{self.horizon * SAMPLE_TIME_S:g} s, movement {1e3 * self.movement_s:g} ms, "
             f"{type(self.loss).__name__.lower()}, {low:g} to {high:g} s"
         )
+
+    @property
+    def slug(self) -> str:
+        """The name as part of a file name."""
+        return "_".join("".join(c if c.isalnum() or c == "." else " " for c in self.name).split())
 
 
 @dataclass(frozen=True)
@@ -148,7 +154,8 @@ def needed(plant: Plant, physical: Plant, recording: Recording) -> np.ndarray:
 
     NaN where that moves too slowly to tell, or the other way.
     """
-    x, u = recording[PRESSURE][None], recording[COMMAND][None]
+    x = np.convolve(recording[PRESSURE], np.full(SMOOTHED, 1.0 / SMOOTHED), "same")[None]
+    u = recording[COMMAND][None]
 
     def rates(of: Plant) -> np.ndarray:
         n = x.shape[1]

@@ -96,7 +96,8 @@ def test_records_are_kept_and_read_back(tmp_path, monkeypatch):
     again = recorded(3.0, tmp_path / "records.npz")
 
     assert again.event == first.event == (5, 9)
-    assert again.judged[PRESSURE] == pytest.approx(3e5) and len(again.other) == 1200
+    assert again.judged[PRESSURE] == pytest.approx(3e5) and len(again.judged) == 1200
+    assert again.training[PRESSURE] == pytest.approx(1e5) and len(again.training) == 12_000
     assert again.nominal.sum() == 5  # the mark of the event outlasts the record
 
 
@@ -147,7 +148,7 @@ def tracked_jump():
     pressure = free_run(parametric(), blank, taus)
     noisy = pressure + 1e3 * np.random.default_rng(2).standard_normal(n)
     record = Recording("jump", SAMPLE_TIME_S, {COMMAND: u, PRESSURE: noisy})
-    data = Data(record, record, record, (n // 2, n))
+    data = Data(record, record, (n // 2, n))
     setting = Setting(horizon=100)
     return data, taus, *tracked(parametric(), record, setting)
 
@@ -177,7 +178,7 @@ def test_a_shift_in_time_is_found_as_lag():
     u = steps((0.57, 0.44) * 8, 1.5)
     n = len(u)
     record = Recording("edges", SAMPLE_TIME_S, {COMMAND: u, PRESSURE: np.full(n, 3e5)})
-    data = Data(record, record, record, (n, n))
+    data = Data(record, record, (n, n))
     wanted = 0.05 + 0.02 * np.sin(np.arange(n) / 90.0)
     late = np.roll(wanted, 80)
 

@@ -97,6 +97,8 @@ def trade_off_figure(
         for (name, row), colour, mark in zip(curves.items(), colours, MARKS, strict=False):
             labels, nominal, event = zip(*row, strict=True)
             axes.plot(nominal, event, "-", marker=mark, markersize=3, color=colour, label=name)
+            if len(row) == 1:  # only a curve needs to say which point is which
+                continue
             for label, x, y in zip(labels, nominal, event, strict=True):
                 axes.annotate(
                     label, (x, y), xytext=(3, 3), textcoords="offset points", fontsize=6,
@@ -106,6 +108,7 @@ def trade_off_figure(
             axes.plot(*at, mark, color=RED, markersize=7, linestyle="none", label=name)
         axes.set_xlabel("RMS error of the free run outside the event (psi)")
         axes.set_ylabel("largest error in the event (psi)")
+        axes.margins(0.08)
         axes.set_xlim(left=0.0)
         axes.set_ylim(bottom=0.0)
         figure.legend(*axes.get_legend_handles_labels(), loc="outside right center")

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from studies.truth.batch import stack
-from studies.truth.case import generator
+from studies.truth.case import Case, generator
 from studies.truth.cases import read_cases
 from studies.truth.instruments import quantised
 from studies.truth.plants import SOFT_JOINT
@@ -46,10 +46,22 @@ class EventRecord:
     event: tuple[int, int]
 
 
+def bellows() -> Case:
+    """The bellows of all these records: small differences of a stored case, and the full band."""
+    return replace(read_cases(SOFT_JOINT.stored)[HIDDEN, 1], size=STUCK_SHARE)
+
+
+def diagnosis_records() -> tuple[Mapping[str, np.ndarray], Mapping[str, np.ndarray]]:
+    """Training and validation of the same bellows, with ramps through the centre of the valve.
+
+    Steps past the edges cannot tell a spool that sticks from a wider overlap; a slow ramp can.
+    """
+    return SOFT_JOINT.record([bellows()])[0]
+
+
 def event_records(duration_s: float, seeds: Sequence[int]) -> list[EventRecord]:
     """Records of so many seconds at 400 Hz, one for each seed, of one bellows, in one batch."""
-    case = read_cases(SOFT_JOINT.stored)[HIDDEN, 1]
-    joint = replace(joint_of(case), stuck_band_share=STUCK_SHARE)
+    joint = joint_of(bellows())
     wanted = [event_command(duration_s, generator(HIDDEN, seed, "event")) for seed in seeds]
     command = quantised(np.stack([each for each, _ in wanted], axis=1), COMMAND_STEP)
     readings, _ = run(stack([joint] * len(seeds)), command)
