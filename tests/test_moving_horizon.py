@@ -21,9 +21,13 @@ from linear_plant import cart
 from scipy.optimize import least_squares
 
 import estimators.moving_horizon as moving_horizon
+from estimators.moving_horizon import MovingHorizon
 from estimators.nearest_inside import OutsideError
 from workbench.errors import UnknownNameError
 from workbench.plants import PLANTS
+from workbench.plants.servo_drive import COMMAND as VALVE
+from workbench.plants.servo_drive import OUTPUTS, servo_drive
+from workbench.polytropic import with_polytropic_gas
 from workbench.recording import Recording
 from workbench.simulation import simulate
 
@@ -250,3 +254,32 @@ def test_a_horizon_without_sense_is_refused(joint, wrong, message):
 def test_what_the_plant_does_not_have_is_refused_with_the_nearest(joint, wrong):
     with pytest.raises(UnknownNameError, match="has no"):
         on_joint(joint, **wrong)
+
+
+def test_beside_four_states_of_the_servo_drive_a_parameter_is_found():
+    """Viscous friction 40 % larger than believed, 0.2 s of sliding, all sensors with noise."""
+    drive = (
+        with_polytropic_gas(servo_drive()).with_values({"friction.presliding_share": 0.0}).lean()
+    )
+    viscous, n = "friction.viscous_n_s_m", 200
+    u = 5.9 + 0.3 * np.sin(2.0 * np.pi * 1e-3 * np.arange(n))
+    truth = drive.with_values({viscous: 61.7})
+    made = simulate(truth, Recording("truth", 1e-3, {VALVE: u}))
+    noise = dict(zip(OUTPUTS, (5e-6, 500.0, 500.0), strict=True))
+    rng = np.random.default_rng(0)
+    y = made.rows(OUTPUTS).T + np.array([*noise.values()]) * rng.standard_normal((n, 3))
+    estimator = MovingHorizon(
+        plant=drive,
+        sample_time_s=1e-3,
+        measurement_noise=noise,
+        process_noise={"slide.velocity_m_s": 0.05},
+        constants={viscous: 1.0},
+        horizon=30,
+    )
+
+    found = run(estimator, u[:, None], y)
+
+    assert found[-1].notes[f"estimated {viscous}"] == pytest.approx(61.7, rel=0.03)
+    velocity = np.array([e.state[1] for e in found[50:]])
+    assert np.abs(velocity - made["slide.velocity_m_s"][50:]).max() < 0.01
+    assert sum(e.notes["fallback"] for e in found) <= 4
