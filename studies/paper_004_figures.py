@@ -14,7 +14,7 @@ from studies.figures.soft_joint import (
     trade_off_figure,
 )
 from studies.soft_joint_fits import PSI_PA, SAMPLE_TIME_S, Data, Fitted, FreeRun
-from studies.soft_joint_horizon import EDGE_S, Setting, Worth, edges, free_run
+from studies.soft_joint_horizon import Setting, Worth, edges, free_run
 from studies.soft_joint_improved import Improved
 from workbench.plant import Plant
 from workbench.plants.soft_joint import COMMAND, PRESSURE
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 AROUND_S = (4.0, 6.0)  # before and after the event
+EDGE_SPAN_S = (0.2, 1.2)  # before and after an edge
 PAPER, SHORT = Setting(), Setting(horizon=40)
 
 
@@ -76,25 +77,20 @@ def _event(
 
 
 def _edges(data: Data, taus: Mapping[Setting, np.ndarray], wanted: np.ndarray) -> Figure:
-    """Geometric means over the edges outside the event, sample by sample behind them."""
-    span = np.arange(round(EDGE_S / SAMPLE_TIME_S))
-    needed_s, found_s = {}, {}
+    """Of each kind the edge outside the event behind which most is known of what is needed."""
+    before, after = (round(s / SAMPLE_TIME_S) for s in EDGE_SPAN_S)
+    panels = {}
     for kind, at in edges(data.judged).items():
-        inside = [k + span for k in at if k + span[-1] < len(wanted)]
-        every = np.array([each for each in inside if data.nominal[each].all()])
-        needed_s[kind] = _geometric(wanted[every])
-        for setting in (PAPER, SHORT):
-            length_s = f"{setting.horizon * SAMPLE_TIME_S:g} s"
-            found_s[f"{kind}: {length_s}"] = _geometric(taus[setting][every])
-    return edge_figure(span * SAMPLE_TIME_S, needed_s, found_s)
-
-
-def _geometric(values: np.ndarray) -> np.ndarray:
-    """Mean of the logarithms of what is there, by column; NaN where most is not."""
-    there = np.isfinite(values)
-    logs = np.where(there, np.log(np.where(there, values, 1.0)), 0.0)
-    mean = logs.sum(axis=0) / np.maximum(there.sum(axis=0), 1)
-    return np.where(there.mean(axis=0) > 0.5, np.exp(mean), np.nan)
+        whole = [k for k in at if before <= k < len(wanted) - after]
+        inside = [k for k in whole if data.nominal[k - before : k + after].all()]
+        best = max(inside, key=lambda k: np.isfinite(wanted[k : k + after]).sum())
+        seen = slice(best - before, best + after)
+        title = f"{kind} edge at {best * SAMPLE_TIME_S:.1f} s"
+        panels[title] = {"needed, from the flows": wanted[seen]} | {
+            f"horizon {setting.horizon * SAMPLE_TIME_S:g} s": taus[setting][seen]
+            for setting in (PAPER, SHORT)
+        }
+    return edge_figure(np.arange(-before, after) * SAMPLE_TIME_S, panels)
 
 
 def _trade_off(taus: Mapping[Setting, np.ndarray], rows: Mapping[str, Worth]) -> Figure:

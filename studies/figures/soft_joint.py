@@ -57,26 +57,21 @@ def event_figure(
     return figure
 
 
-def edge_figure(
-    time_s: np.ndarray, needed_s: Mapping[str, np.ndarray], found_s: Mapping[str, np.ndarray]
-) -> Figure:
-    """Mean time constants after rising and falling edges: what is needed, and what is estimated.
-
-    By kind of edge; ``found_s`` by kind and setting, joined by a colon.
-    """
+def edge_figure(time_s: np.ndarray, panels_s: Mapping[str, Mapping[str, np.ndarray]]) -> Figure:
+    """Time constants before and after an edge, by the title of a panel and the name of a curve."""
     with styled():
         figure = new_figure(PAGE_IN, 2.6)
-        panels = figure.subplots(1, len(needed_s), sharey=True)
-        for axes, (kind, needed) in zip(panels, needed_s.items(), strict=True):
-            axes.plot(time_s, needed, color=BLACK, label="needed, from the flows")
-            mine = {k.split(": ")[1]: v for k, v in found_s.items() if k.startswith(kind)}
-            for (name, values), (colour, line) in zip(mine.items(), LOOKS[1:], strict=False):
-                axes.plot(time_s, values, line, color=colour, label=f"horizon {name}")
-            axes.set_title(f"{kind} edges")
+        panels = figure.subplots(1, len(panels_s), sharey=True)
+        for axes, (title, curves) in zip(panels, panels_s.items(), strict=True):
+            for (name, values), (colour, line) in zip(curves.items(), LOOKS, strict=False):
+                axes.plot(time_s, values, line, color=colour, label=name)
+            axes.axvline(0.0, color="0.7", linewidth=0.6, zorder=0)
+            axes.set_title(title)
             axes.set_xlabel("time after the edge (s)")
             axes.set_yscale("log")
             axes.yaxis.set_major_formatter("{x:g}")
-        panels[0].set_ylabel("time constant (s), geometric mean")
+            axes.yaxis.set_minor_formatter("")
+        panels[0].set_ylabel("time constant (s)")
         handles = panels[0].get_legend_handles_labels()
         figure.legend(*handles, loc="outside lower center", ncols=4)
     return figure
