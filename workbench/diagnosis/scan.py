@@ -31,7 +31,7 @@ from workbench.diagnosis.blind_starts import blind_starts, freed
 from workbench.diagnosis.metric import Metric, every_second
 from workbench.effect import Parameter
 from workbench.fitting.linearised import Linearised, Point
-from workbench.fitting.problem import Problem, staged, stateless
+from workbench.fitting.problem import Problem, fuller, stateless
 from workbench.fitting.start_states import carried
 from workbench.fitting.unknowns import Unknowns
 from workbench.fitting.windows import Windows
@@ -101,11 +101,10 @@ def scan(
     windows, point, metric, of_all = every_second(windows, unknowns, point, at)
     blind = blind_starts(windows.plant, metric.at)
     values = unknowns.values(point.t)
-    kept = [effect.name for effect in windows.plant.effects if effect.absent]
     profiles = []
     known = whole.parameters
     for needed, members in _groups(whole, windows.plant, candidates).items():
-        richer = windows.with_plant(staged(whole, *kept, *needed)) if needed else windows
+        richer = windows.with_plant(fuller(whole, windows.plant, *needed)) if needed else windows
         starts = carried(point.starts, windows, richer)
         trials = [
             (candidate, change)

@@ -90,6 +90,16 @@ def staged(whole: Plant, *members: str) -> Plant:
     return whole.lean(keep=[*tolerated, *members])
 
 
+def fuller(whole: Plant, plant: Plant, *members: str) -> Plant:
+    """The whole plant staged for the named members and for all that another one of it holds.
+
+    That one may hold what is absent, and in full what could be reduced: the friction of which an
+    added cause is one keeps its bristle, whose state has to be there again.
+    """
+    held = [e.name for e in plant.effects if e.absent or e.reduced() is not e]
+    return staged(whole, *held, *members)
+
+
 def stateless(plant: Plant) -> list[Effect]:
     """The effects of a plant that bring no states."""
     return [effect for effect in plant.effects if not tuple(effect.states())]
