@@ -43,7 +43,8 @@ def called(function: ca.Function, *arguments: object) -> tuple[np.ndarray, ...]:
 def prepared(function: ca.Function) -> Callable[..., list[np.ndarray]]:
     """:func:`called` for what is called at every sample: columns in, columns out, no checks.
 
-    Arguments are contiguous columns of floats, results are new ones.  Not for several threads.
+    Arguments are contiguous columns of floats for dense inputs, results are new ones.  Not for
+    several threads.
     """
     buffer, evaluate = function.buffer()
     lengths = [function.nnz_out(k) for k in range(function.n_out())]
