@@ -257,6 +257,18 @@ def test_intensities_side_by_side_are_as_likely_as_one_after_the_other(recorded)
         assert likelihood == pytest.approx(filter_pass(known, part).log_likelihood, abs=1e-6)
 
 
+def test_a_run_that_is_lost_leaves_the_others_as_they_are(recorded):
+    _, _, recording = recorded
+    part = recording.part(0, 600)
+    many = recording_filter(servo_drive(), part, {VELOCITY: 2.0}, decimate=4)
+    alone = log_likelihoods(many, part, np.array([[1.0]]))
+
+    found = log_likelihoods(many, part, np.array([[1e20, 1.0, 1e6]]))
+
+    assert list(np.isfinite(found)) == [False, True, False]
+    assert found[1] == pytest.approx(alone[0], abs=1e-9)
+
+
 def test_a_start_keeps_the_gas_at_its_temperature():
     plant = servo_drive().lean()
     x = consistent_start(plant, {"slide.position_m": 0.05, "chamber_a.pressure_pa": 3e5})

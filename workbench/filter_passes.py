@@ -11,6 +11,7 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import casadi as ca
 import numpy as np
 
 from workbench.called import called, result
@@ -86,18 +87,46 @@ def log_likelihoods(found: PlantFilter, recording: Recording, factors: np.ndarra
     pairs = zip(*(_covariances(found, column) for column in factors.T), strict=True)
     P, Q = (np.array([each.ravel() for each in several]).T for several in pairs)
     total = np.zeros((1, n))
-    runs = found.likelihood.fold(BLOCK).map(n, "thread", min(n, os.cpu_count() or 1))
-    last = found.likelihood.map(n)
+    block, one = found.likelihood.fold(BLOCK), found.likelihood
+    threads = min(n, os.cpu_count() or 1)
+    runs, last = (block.map(n, "thread", threads), block), (one.map(n), one)
     for piece in recording.pieces:
         start, columns = _posed(found, piece)
         now = np.vstack([np.tile(start[:, None], n), P, Q, total])
         whole = columns[-1].shape[1] // BLOCK * BLOCK
         for part in _blocks(columns, slice(0, whole), BLOCK):
-            now = result(runs, now, *(np.tile(each, n) for each in part))
+            now = _side_by_side(*runs, now, part)
         for part in _blocks(columns, slice(whole, columns[-1].shape[1]), 1):
-            now = result(last, now, *(np.tile(each, n) for each in part))
+            now = _side_by_side(*last, now, part)
         total = now[-1:]
     return total.ravel()
+
+
+def _side_by_side(
+    runs: ca.Function, one: ca.Function, now: np.ndarray, part: Sequence[np.ndarray]
+) -> np.ndarray:
+    """All runs after a part of the recording, (n_state, n); a lost one is NaN from there on.
+
+    The filter of a run that leaves all bounds fails in its linear equations, and with it the call
+    for all: then each goes on alone.  A lost run computes with the numbers of another.
+    """
+    lost = ~np.isfinite(now).all(axis=0)
+    if lost.all():
+        return now
+    going = np.where(lost, now[:, [int(np.argmin(lost))]], now)
+    try:
+        after = result(runs, going, *(np.tile(each, now.shape[1]) for each in part))
+    except RuntimeError:
+        after = np.column_stack([_alone(one, column, part) for column in going.T])
+    return np.where(lost, np.nan, after)
+
+
+def _alone(one: ca.Function, now: np.ndarray, part: Sequence[np.ndarray]) -> np.ndarray:
+    """One run after a part of the recording; NaN where it is lost."""
+    try:
+        return result(one, now, *part)[:, 0]
+    except RuntimeError:
+        return np.full(len(now), np.nan)
 
 
 def _blocks(

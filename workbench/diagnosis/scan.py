@@ -126,9 +126,28 @@ def scan(
 def scan_catalogue(problem: Problem) -> list[Profile]:
     """Profiles of the causes that are not there and not shifts of fitted parameters."""
     base = problem.base
+    absent, at = _absent(problem), problem.linearised
+    return scan(problem.whole, base.windows, base.unknowns, base.point, absent, at)
+
+
+def scan_from_priors(problem: Problem) -> list[Profile]:
+    """The same where no parameter has moved yet; nothing where the prior fit moved none far.
+
+    Parameters that imitate an effect hide it from a scan at the prior fit: what an underlap lets
+    through, a leak and another heat flow together do too, several deviations off their priors.
+    """
+    if not problem.moved_far:
+        return []
+    base = problem.base
+    point = Point(problem.at_priors, base.point.starts)
+    return scan(problem.whole, base.windows, base.unknowns, point, _absent(problem))
+
+
+def _absent(problem: Problem) -> list[Candidate]:
+    base = problem.base
     values = base.plant.values
     known = problem.whole.parameters
-    absent = [
+    return [
         c
         for c in problem.whole.candidates.values()
         if c.held is None and c.strength not in problem.rig.fixed
@@ -136,8 +155,6 @@ def scan_catalogue(problem: Problem) -> list[Profile]:
         and (c.cause.tolerated or values.get(c.strength, known[c.strength].null)
              == known[c.strength].null)
     ]  # fmt: skip
-    at = problem.linearised
-    return scan(problem.whole, base.windows, base.unknowns, base.point, absent, at)
 
 
 def sizes_to_try(plant: Plant, candidate: Candidate) -> list[dict[str, float]]:
