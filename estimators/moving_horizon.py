@@ -1,20 +1,19 @@
-"""Moving-horizon estimation: Gauss-Newton on the last samples, arrival cost from a Kalman filter.
+"""Moving-horizon estimation on the plant itself: states, unknown inputs and constants of a window.
 
-    min over x_0 .. x_N   |x_0 - prior|^2_P  +  sum |x_k+1 - step(x_k, u_k)|^2_Q
-                          + sum |y_k - h(x_k)|^2_R
+    min over X_0 .. X_N   |X_0 - prior|^2_P  +  sum |X_k+1 - step(X_k, u_k)|^2_Q
+                          + sum rho((y_k - h(X_k)) / r),     lower <= X_N <= upper
 
-One Gauss-Newton step on this problem, linearised along a trajectory, is one Kalman filter and
-smoother pass over the window (Bell 1994), which exploits its structure and needs no solver.  The
-trajectory of the last sample, shifted, is where the next one is linearised, so one pass per sample
-is enough; more can be asked for.  What leaves the window enters the prior.
+One Gauss-Newton step per sample (real-time iteration) from the last path, shifted; see
+:class:`Horizon` for how it is taken.  A step that does not lower the cost is halved.  Bounds that
+the step would pass are held by a small QP, exact because the problem condenses to X_N; what is
+constant over the window keeps them in all of it.  Where no step lowers the cost, something is not
+finite, or the answer comes late, the estimate is that of the extended Kalman filter, and the notes
+say so.
 
-A bristle follows the trajectory's velocity through the plant itself and is neither corrected nor
-smoothed: moved along a tangent it would bend further than it can.
+On a linear plant with squared errors every step is exact and the estimate is the Kalman filter's.
 
-On a linear plant every pass is exact and the estimate is that of the Kalman filter.
-
-Source: Bell 1994, "The iterated Kalman smoother as a Gauss-Newton method"; Rao, Rawlings and Mayne
-2003, "Constrained state estimation for nonlinear discrete-time systems", for the arrival cost.
+Source: Rao, Rawlings and Mayne 2003, "Constrained state estimation for nonlinear discrete-time
+systems"; Diehl, Bock and Schloeder 2005, "A real-time iteration scheme".
 """
 
 from __future__ import annotations
@@ -22,54 +21,49 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from math import inf
+from time import perf_counter
 
-import casadi as ca
 import numpy as np
 
 from estimators.extended_kalman import ExtendedKalman
+from estimators.horizon import Horizon
+from estimators.losses import Loss, Squared
+from estimators.nearest_inside import OutsideError, nearest_inside
 from workbench.contracts import Estimate
-from workbench.filtering import smoothed
-from workbench.plant import Plant
+from workbench.plant import Plant, require
+from workbench.rosenbrock import COARSEST_STEP_S
+
+HALVINGS = 4
+GROWTH, ROUNDING = 1e-3, 1e-9  # share and size by which a step may raise the cost: at rest, the
+# kinks of friction leave no direction that lowers it
 
 
-@dataclass(frozen=True)
-class Node:
-    """One sample of the window, scaled as in :class:`PlantFilter`.
+def allowed(cost: float) -> float:
+    """The highest cost that a step may lead to from this one."""
+    return cost * (1.0 + GROWTH) + ROUNDING
 
-    point         where the plant is linearised, shape (n_X,)
-    command       held from this sample to the next, shape (n_u,); not yet known at the newest
-    measurement   shape (n_y,), NaN where missing
-    """
 
-    point: np.ndarray
-    command: np.ndarray
-    measurement: np.ndarray
+class LostError(ArithmeticError):
+    """No step lowers the cost, or something is not finite."""
 
 
 @dataclass(frozen=True)
 class Window:
-    """The samples of the horizon and what was known before the first of them."""
+    """What an estimate carries: the tape of :class:`Horizon`, and the newest X with covariance."""
 
-    prior: np.ndarray
-    covariance: np.ndarray
-    nodes: tuple[Node, ...]
+    tape: np.ndarray
+    X: np.ndarray
+    P: np.ndarray
 
 
 @dataclass(frozen=True)
-class Pass:
-    """One filter pass over a window, one entry per node: see :func:`workbench.filtering.smoothed`.
+class Step:
+    """A step that was taken: the window behind it, its length, and whether bounds were active."""
 
-    ``prior`` and ``covariance`` are what the first node hands on to the second.
-    """
-
-    X: np.ndarray
-    P: np.ndarray
-    F: np.ndarray
-    said: np.ndarray
-    weights: np.ndarray
-    left: np.ndarray
-    prior: np.ndarray
-    covariance: np.ndarray
+    window: Window
+    length: float
+    bounded: bool
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,9 +73,32 @@ class MovingHorizon:
     Attributes
     ----------
     measurement_noise, process_noise, unknown_inputs
-        As in :class:`ExtendedKalman`.
+        As in :class:`ExtendedKalman`; in the window, too, states and unknown inputs wander so.
+    constants
+        Parameters that are one value over the window, by ``part.parameter_unit``, with the standard
+        deviation of their movement from one sample to the next: the smaller, the dearer.
+    bounds
+        (lower, upper) of states, unknown inputs and constants, the last as values; at the newest
+        sample.
+    loss
+        What errors of the measurements cost.
+    arrival_noise
+        What a state gains besides, per square root of a second, in the arrival cost alone: trust in
+        the start of a window whose inside has no noise.
     passes
         Gauss-Newton steps per sample.
+    deadline_s
+        What takes longer is late.
+    coarsest_s
+        Longest step of the integrator.
+
+    Raises
+    ------
+    ValueError
+        For a horizon below two samples, a movement or passes not above zero, or a bound whose lower
+        end is not below its upper one.
+    UnknownNameError
+        For names that the plant does not have.
     """
 
     plant: Plant
@@ -89,101 +106,195 @@ class MovingHorizon:
     measurement_noise: Mapping[str, float]
     process_noise: Mapping[str, float]
     unknown_inputs: Mapping[str, float] = field(default_factory=dict)
+    constants: Mapping[str, float] = field(default_factory=dict)
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    loss: Loss = Squared()
+    arrival_noise: Mapping[str, float] = field(default_factory=dict)
     horizon: int = 4
     passes: int = 1
+    deadline_s: float = inf
+    coarsest_s: float = COARSEST_STEP_S
+
+    def __post_init__(self) -> None:
+        name, model = self.plant.name, self.plant.model
+        if self.horizon < 2 or self.passes < 1:
+            raise ValueError(f"{name}: a horizon has 2 samples and 1 pass at least")
+        require(self.constants, model.parameters, f"parameters of {name}")
+        require(self.arrival_noise, model.states, f"states of {name}")
+        require(self.bounds, self._names, f"what the horizon of {name} estimates")
+        for constant, movement in self.constants.items():
+            if not movement > 0.0:
+                raise ValueError(f"{constant} moves by {movement}, expected above 0")
+        for bounded, (lower, upper) in self.bounds.items():
+            if not lower < upper:
+                raise ValueError(f"{bounded}: bounds are {lower} and {upper}, expected lower first")
 
     def start(self, measurement: np.ndarray) -> Estimate:
         begun = self.kalman.start(measurement)
-        nothing = np.full(len(self.plant.measured), np.nan)
-        node = Node(begun.memory[0], self.plant.nominal[0], nothing)
-        return replace(begun, memory=Window(*begun.memory, (node,)))
+        return self._told(self._anew(*begun.memory), {})
 
     def update(self, last: Estimate, command: np.ndarray, measurement: np.ndarray) -> Estimate:
-        window = self._moved(last, command, measurement)
-        done = self._pass(window)
-        for _ in range(self.passes - 1):
-            window = self._relinearised(window, done)
-            done = self._pass(window)
-        if not (np.isfinite(done.X).all() and np.isfinite(done.P).all()):
-            return self._fallback(last, command, measurement)
-        window = self._relinearised(window, done)
-        if len(window.nodes) > self.horizon:
-            window = Window(done.prior, done.covariance, window.nodes[1:])
-        found = self.kalman.estimate(done.X[-1], done.P[-1])
-        return replace(found, memory=window, notes={**found.notes, "fallback": 0.0})
+        begun, failed = perf_counter(), False
+        try:
+            step = self._stepped(last.memory, self._news(command, measurement), begun)
+        except (LostError, OutsideError, np.linalg.LinAlgError):
+            failed = True
+        late = perf_counter() - begun > self.deadline_s
+        notes = {"fallback": float(failed or late), "late": float(late)}
+        if not failed:
+            notes |= {"step": step.length, "bounded": float(step.bounded)}
+        if not (failed or late):
+            return self._told(step.window, notes)
+        memory = last.memory.X, last.memory.P
+        found = self.kalman.update(replace(last, memory=memory), command, measurement)
+        X, P = (np.asarray(part, dtype=float) for part in found.memory)
+        again = self._anew(np.clip(X.ravel(), *self._limits), P)
+        if failed:
+            return self._told(again, notes)
+        return replace(self._told(again, notes), memory=replace(again, tape=step.window.tape))
 
     @cached_property
     def kalman(self) -> ExtendedKalman:
-        """The filter that starts the window, and that takes over where a pass fails."""
+        """The filter that starts the window and takes over; to it constants are random walks."""
+        per_s = self.sample_time_s**-0.5
+        walks = {name: movement * per_s for name, movement in self.constants.items()}
         return ExtendedKalman(
             plant=self.plant,
             sample_time_s=self.sample_time_s,
             measurement_noise=self.measurement_noise,
             process_noise=self.process_noise,
-            unknown_inputs=self.unknown_inputs,
+            unknown_inputs={**self.unknown_inputs, **walks},
         )
 
-    def _moved(self, last: Estimate, command: np.ndarray, measurement: np.ndarray) -> Window:
-        """The window with one more sample, linearised where the last estimate leads."""
-        window, found, (_, d, p) = last.memory, self.kalman.filter, self.plant.nominal
-        newest = replace(window.nodes[-1], command=command)
-        ahead, _, _ = found.predict(newest.point, window.covariance, command, d, p)
-        node = Node(ahead.full().ravel(), command, measurement)
-        return replace(window, nodes=(*window.nodes[:-1], newest, node))
-
-    def _pass(self, window: Window) -> Pass:
-        """Filter from node to node; the newest is corrected only, its F is not read."""
-        (_, d, p), X, P = self.plant.nominal, window.prior, window.covariance
-        found, rows, handed = self.kalman.filter, [], []
-        for i, node in enumerate(window.nodes):
-            received = np.isfinite(node.measurement)
-            y = np.where(received, node.measurement, 0.0)
-            X, P, *said = self._correct(X, P, node.point, node.command, d, p, y, received)
-            if i == len(window.nodes) - 1:
-                F = P
-                rows.append((X, P, F, *said))
-                break
-            ahead, P_next, F = found.predict(node.point, P, node.command, d, p)
-            rows.append((X, P, F, *said))
-            X, P = ahead + found.corrected * (F @ (X - node.point)), P_next
-            handed.append((X.full().ravel(), P.full()))
-        columns = (np.array([m.full() for m in column]) for column in zip(*rows, strict=True))
-        X, P, F, said, weights, left = columns
-        return Pass(X[..., 0], P, F, said[..., 0], weights, left, *handed[0])
-
-    def _relinearised(self, window: Window, done: Pass) -> Window:
-        """The window linearised along the smoothed trajectory; bristles follow the filter."""
-        path, _ = smoothed(done.X, done.P, done.F, done.said, done.weights, done.left)
-        path = np.where(self.kalman.filter.corrected, path, done.X)
-        nodes = zip(window.nodes, path, strict=True)
-        return replace(window, nodes=tuple(replace(node, point=at) for node, at in nodes))
-
-    def _fallback(self, last: Estimate, command: np.ndarray, measurement: np.ndarray) -> Estimate:
-        """A Kalman step from the last estimate, and a window that starts anew."""
-        scale = self.kalman.filter.scale
-        n, X = len(self.plant.scale), last.memory.nodes[-1].point.copy()
-        X[:n] = last.state / scale[:n]
-        P = self.kalman.filter.start_covariance.copy()
-        P[:n, :n] = last.covariance / np.outer(scale[:n], scale[:n])
-        found = self.kalman.update(replace(last, memory=(X, P)), command, measurement)
-        nothing = np.full(len(measurement), np.nan)
-        node = Node(found.memory[0], command, nothing)
-        window = Window(*found.memory, (node,))
-        return replace(found, memory=window, notes={**found.notes, "fallback": 1.0})
+    @cached_property
+    def functions(self) -> Horizon:
+        """The functions of the window."""
+        found, arrival = self.kalman.filter, np.zeros(len(self._names))
+        for k, (name, size) in enumerate(zip(self._names, found.scale, strict=True)):
+            arrival[k] = (self.arrival_noise.get(name, 0.0) / size) ** 2 * self.sample_time_s
+        return Horizon(
+            found=found,
+            constants=len(self.constants),
+            nodes=self.horizon,
+            arrival=arrival,
+            loss=self.loss,
+            coarsest_s=self.coarsest_s,
+        )
 
     @cached_property
-    def _correct(self) -> ca.Function:
-        """(X, P, point, u, d, p, y, received) -> (X, P, i, J, L), linearised at ``point``.
+    def _names(self) -> tuple[str, ...]:
+        return (*self.plant.model.states, *self.unknown_inputs, *self.constants)
 
-        With delta = X - point and L = I - K H, the filter's own correction at the point gives
-        X = corrected + L delta; i and J as in :attr:`PlantFilter.correct`.
+    @cached_property
+    def _limits(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper bound of X, infinite where there is none."""
+        ends = [self.bounds.get(name, (-inf, inf)) for name in self._names]
+        lower, upper = (np.array(ends).T - self._zero) / self._units
+        return lower, upper
+
+    @cached_property
+    def _noise(self) -> np.ndarray:
+        return np.array([self.measurement_noise[name] for name in self.plant.measured])
+
+    def _news(self, command: np.ndarray, measurement: np.ndarray) -> np.ndarray:
+        received = np.isfinite(measurement)
+        return np.concatenate(
+            [command, np.where(received, measurement, 0.0) / self._noise, received]
+        )
+
+    def _anew(self, X: np.ndarray, P: np.ndarray) -> Window:
+        """A window that starts from what is known now."""
+        return Window(self.functions.begun(X, P), X, P)
+
+    def _stepped(self, window: Window, news: np.ndarray, begun: float) -> Step:
+        """The window one sample later, after as many steps as there are passes and time."""
+        d, p = self._given
+        tape, told = self.functions.sample(window.tape, news, d, p)
+        step = self._accepted(tape, told[1:], told[0])
+        if step is None:
+            step = self._searched(self.functions.move(window.tape, news, d, p)[0])
+        for _ in range(self.passes - 1):
+            if perf_counter() - begun > self.deadline_s:
+                break
+            step = self._searched(step.window.tape)
+        return step
+
+    def _accepted(self, tape: np.ndarray, told: np.ndarray, before: float) -> Step | None:
+        """The full step where it lowers the cost inside the bounds; else it is to be searched."""
+        X = self.functions.part(tape, "points")[:, -1]
+        if (
+            not told[0] <= before * (1.0 + ROUNDING) + ROUNDING
+        ):  # false, too, where it is not finite
+            return None
+        if self.bounds and not ((self._limits[0] <= X) & (self._limits[1] >= X)).all():
+            return None
+        return Step(Window(tape, X, self._square(told[1 + len(X) :])), 1.0, False)
+
+    def _searched(self, tape: np.ndarray) -> Step:
+        """The longest of the halved steps that lowers the cost, held inside the bounds.
+
+        Raises
+        ------
+        LostError
+            If none does.
         """
-        found, model = self.kalman.filter, self.plant.model
-        n = len(found.scale)
-        X, P, point = ca.MX.sym("X", n), ca.MX.sym("P", n, n), ca.MX.sym("point", n)
-        u, d, p = (ca.MX.sym(k, s.numel()) for k, s in zip("udp", model.symbols[1:], strict=True))
-        y, received = (ca.MX.sym(k, len(model.measured)) for k in ("y", "received"))
-        delta = X - point
-        at, P_now, *_, said, weights, left = found.correct(point, P, u, d, p, y, received)
-        results = [at + left @ delta, P_now, said - weights @ delta, weights, left]
-        return ca.Function("correct_at", [X, P, point, u, d, p, y, received], results)
+        d, p = self._given
+        functions, (lower, upper), n = self.functions, self._limits, len(self._names)
+        aim, told = functions.solve(tape, np.zeros(n))
+        before, newest, P = told[0], told[1 : n + 1], self._square(told[n + 1 :])
+        if not np.isfinite(told).all():
+            raise LostError("the linear problem is not finite")
+        at = functions.part(tape, "points")[:, -1]
+        if ((at < lower) | (at > upper)).any():  # to come back inside may cost anything
+            before = inf
+        bounded = bool(((at + newest < lower) | (at + newest > upper)).any())
+        if bounded:
+            _, push = nearest_inside(newest, P, lower - at, upper - at)
+            aim, _ = functions.solve(tape, push)
+        for k in range(HALVINGS + 1):
+            length = 0.5**k
+            tried, after = functions.run(tape + length * (aim - tape), d, p)
+            if after[0] <= allowed(before):
+                X = np.clip(functions.part(tried, "points")[:, -1], lower, upper)
+                return Step(Window(tried, X, P), length, bounded)
+        raise LostError("no step lowers the cost")
+
+    @cached_property
+    def _given(self) -> tuple[np.ndarray, np.ndarray]:
+        """Measured inputs and parameters, (n_d,) and (n_p,)."""
+        _, d, p = self.plant.nominal
+        return d.copy(), p.copy()
+
+    def _square(self, P: np.ndarray) -> np.ndarray:
+        return P.reshape(len(self._names), -1, order="F")
+
+    def _told(self, window: Window, notes: Mapping[str, float]) -> Estimate:
+        """What the newest X of a window says."""
+        n = len(self.plant.model.states)
+        values = (window.X * self._units + self._zero).tolist()
+        told = dict(zip(self._notes, values[n:], strict=True))
+        covariance = window.P[:n, :n] * self._areas
+        state = np.array(values[:n])
+        return Estimate(self.plant.model.states, state, covariance, window, told | dict(notes))
+
+    @cached_property
+    def _units(self) -> np.ndarray:
+        return self.kalman.filter.scale
+
+    @cached_property
+    def _areas(self) -> np.ndarray:
+        """Units of the covariance of the states."""
+        n = len(self.plant.model.states)
+        return np.outer(self._units[:n], self._units[:n])
+
+    @cached_property
+    def _zero(self) -> np.ndarray:
+        """The values that X counts from: those of the parameters, else 0."""
+        values = self.plant.values
+        return np.array([values[n] if n in self.constants else 0.0 for n in self._names])
+
+    @cached_property
+    def _notes(self) -> tuple[str, ...]:
+        """Names under which unknown inputs and constants stand in the notes."""
+        unknown = (f"unknown {name}" for name in self.unknown_inputs)
+        return (*unknown, *(f"estimated {name}" for name in self.constants))

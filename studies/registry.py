@@ -8,6 +8,7 @@ from studies import (
     hidden_study,
     identification_study,
     mode_placement,
+    paper_004,
     shift_study,
 )
 from studies.study import Study
@@ -20,6 +21,7 @@ STUDIES: dict[str, Study] = {
         hidden_study.STUDY,
         identification_study.STUDY,
         mode_placement.STUDY,
+        paper_004.STUDY,
         shift_study.STUDY,
     )
 }

@@ -120,3 +120,20 @@ def test_the_straight_line_meets_the_nozzle_law_where_it_begins():
     below, above = (float(nozzle_function(LAMINAR_RATIO + e)) for e in (-1e-12, 1e-12))
 
     assert below == pytest.approx(above, rel=1e-8)
+
+
+@pytest.mark.parametrize("kappa", [1.1, 1.3, 1.66])
+def test_a_nozzle_of_another_gas_has_the_textbook_flow(kappa):
+    """C_sub r^(1/k) sqrt(1 - r^((k-1)/k)) of physics.md 1.1, and choked where its slope is zero."""
+    subsonic = np.sqrt(2.0 * kappa / (AIR_J_KG_K * (kappa - 1.0)))
+    exponent = (kappa - 1.0) / kappa
+    ratios = np.array([0.7, 0.9, 0.99])
+    expected = subsonic * ratios ** (1.0 / kappa) * np.sqrt(1.0 - ratios**exponent)
+
+    choked = float(choked_constant(AIR_J_KG_K, kappa))
+    found = [choked * float(nozzle_function(r, kappa)) for r in ratios]
+
+    assert found == pytest.approx(expected)
+    every = np.linspace(0.3, 0.7, 4001)
+    flows = subsonic * every ** (1.0 / kappa) * np.sqrt(1.0 - every**exponent)
+    assert choked == pytest.approx(flows.max(), rel=1e-6)

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as some
 
-from workbench.called import called, result
+from workbench.called import called, prepared, result
 
 
 def polynomial() -> ca.Function:
@@ -49,3 +49,15 @@ def test_missing_numbers_pass_and_empty_inputs_are_no_obstacle():
 def test_wrong_shapes_are_refused(arguments):
     with pytest.raises(ValueError, match="polynomial"):
         called(polynomial(), *arguments)
+
+
+def test_a_prepared_call_gives_the_same_and_keeps_no_result():
+    x = ca.SX.sym("x", 3)
+    doubled = ca.Function("doubled", [x], [2.0 * x, ca.sum1(x)])
+    call = prepared(doubled)
+
+    first, total = call(np.array([1.0, 2.0, 3.0]))
+    second, _ = call(np.array([5.0, 6.0, 7.0]))
+
+    assert first.tolist() == [2.0, 4.0, 6.0] and total.tolist() == [6.0]
+    assert second.tolist() == [10.0, 12.0, 14.0]

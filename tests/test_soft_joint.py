@@ -154,3 +154,16 @@ def test_a_stuck_spool_holds_the_pressure_that_the_parametric_model_lets_go(join
 
     assert truth.min() / PSI_PA >= 74 and truth.max() / PSI_PA <= 77.5
     assert 32 <= model[-1] / PSI_PA <= 35
+
+
+def test_kappa_counts_in_the_balance_and_in_the_flow(joint):
+    """Choked filling: the rate goes with kappa times sqrt(kappa (2/(k+1))^((k+1)/(k-1)))."""
+
+    def rate(kappa):
+        plant = joint.with_values({"bellows.heat_capacity_ratio": kappa})
+        return float(joint.model.f(AMBIENT_PA, 0.7, [], plant.nominal[2])[0])
+
+    def expected(k):
+        return k * np.sqrt(k * (2.0 / (k + 1.0)) ** ((k + 1.0) / (k - 1.0)))
+
+    assert rate(1.2) / rate(1.4) == pytest.approx(expected(1.2) / expected(1.4), rel=1e-6)

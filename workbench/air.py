@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import sqrt
 from types import SimpleNamespace
 
 import casadi as ca
@@ -13,24 +12,34 @@ from workbench.effect import Expression
 
 HEAT_CAPACITY_RATIO = 1.4
 GAS_CONSTANT_J_KG_K = 287.0
-CRITICAL_RATIO = (2.0 / (HEAT_CAPACITY_RATIO + 1.0)) ** (
-    HEAT_CAPACITY_RATIO / (HEAT_CAPACITY_RATIO - 1.0)
-)
+
+
+def critical_ratio(heat_capacity_ratio: Expression) -> Expression:
+    """Pressure ratio below which an ideal nozzle is choked: (2/(kappa+1))^(kappa/(kappa-1))."""
+    k = heat_capacity_ratio
+    return (2.0 / (k + 1.0)) ** (k / (k - 1.0))
+
+
+CRITICAL_RATIO = critical_ratio(HEAT_CAPACITY_RATIO)
 LAMINAR_RATIO = 0.999  # above it the flow is linear in the ratio, so that its slope stays finite
 LOWEST_PRESSURE_PA = 1.0  # solvers try states that no gas has; the equations must survive them
 LOWEST_TEMPERATURE_K = 1.0
 
 
-def choked_constant(gas_constant_j_kg_k: float) -> float:
+def choked_constant(
+    gas_constant_j_kg_k: float, heat_capacity_ratio: Expression = HEAT_CAPACITY_RATIO
+) -> Expression:
     """C_chk in s sqrt(K)/m: mass flow per area and upstream pressure over sqrt(T), choked.
 
     C_chk = sqrt(kappa/R (2/(kappa+1))^((kappa+1)/(kappa-1)))
     """
-    k = HEAT_CAPACITY_RATIO
-    return sqrt(k / gas_constant_j_kg_k * (2.0 / (k + 1.0)) ** ((k + 1.0) / (k - 1.0)))
+    k = heat_capacity_ratio
+    return ca.sqrt(k / gas_constant_j_kg_k * (2.0 / (k + 1.0)) ** ((k + 1.0) / (k - 1.0)))
 
 
-def nozzle_function(ratio: Expression) -> Expression:
+def nozzle_function(
+    ratio: Expression, heat_capacity_ratio: Expression = HEAT_CAPACITY_RATIO
+) -> Expression:
     """Psi(r) / C_chk of an ideal nozzle, r = p_d/p_u clipped to [0, 1].
 
     1                                                     r <= r_c
@@ -40,9 +49,9 @@ def nozzle_function(ratio: Expression) -> Expression:
     Source: papers 000, 001 (flow through a valve), 003 Eq. 1, 004 Eqs. 3 and 4; the straight line
     is a repair, because the slope at r = 1 is infinite (physics.md 1.1 c).
     """
-    k = HEAT_CAPACITY_RATIO
-    at_choking = CRITICAL_RATIO ** (1.0 / k) * sqrt(1.0 - CRITICAL_RATIO ** ((k - 1.0) / k))
-    bounded = ca.fmin(ca.fmax(ratio, CRITICAL_RATIO), LAMINAR_RATIO)
+    k, critical = heat_capacity_ratio, critical_ratio(heat_capacity_ratio)
+    at_choking = critical ** (1.0 / k) * ca.sqrt(1.0 - critical ** ((k - 1.0) / k))
+    bounded = ca.fmin(ca.fmax(ratio, critical), LAMINAR_RATIO)
     cooled = ca.exp((k - 1.0) / k * ca.log(bounded))  # a power whose slope costs no second one
     subsonic = bounded / cooled * ca.sqrt(1.0 - cooled) / at_choking  # r^(1/k) = r / r^((k-1)/k)
     above = ca.fmin((1.0 - ratio) / (1.0 - LAMINAR_RATIO), 1.0)
@@ -75,8 +84,10 @@ def iso_function(
 class NozzleLaw:
     """Flow law of a plain hole."""
 
+    heat_capacity_ratio: Expression = HEAT_CAPACITY_RATIO
+
     def __call__(self, ratio: Expression) -> Expression:
-        return nozzle_function(ratio)
+        return nozzle_function(ratio, self.heat_capacity_ratio)
 
 
 @dataclass(frozen=True)

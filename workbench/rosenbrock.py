@@ -38,7 +38,11 @@ LEVELS = 6  # the finest steps are 1/1024 of the coarse one: a contact met at sp
 
 
 def controlled_step(
-    symbols: tuple[ca.SX, ...], rates: ca.SX, sample_time_s: float, tolerances: np.ndarray
+    symbols: tuple[ca.SX, ...],
+    rates: ca.SX,
+    sample_time_s: float,
+    tolerances: np.ndarray,
+    coarsest_s: float = COARSEST_STEP_S,
 ) -> ca.Function:
     """(x, u, d, p) -> x one sample later, inputs held.
 
@@ -50,9 +54,14 @@ def controlled_step(
     advance = _last(trial)
     for _ in range(LEVELS - 1):
         advance = _refined(trial, advance)
-    steps = max(ceil(sample_time_s / COARSEST_STEP_S - 1e-9), 1)
+    steps = steps_of(sample_time_s, coarsest_s)
     x_next = _times(advance, steps, x, ca.vertcat(u, d, p), sample_time_s / steps)
     return ca.Function("step", [x, u, d, p], [x_next], [*"xudp"], ["x_next"])
+
+
+def steps_of(sample_time_s: float, coarsest_s: float = COARSEST_STEP_S) -> int:
+    """Into how many steps a sample is divided."""
+    return max(ceil(sample_time_s / coarsest_s - 1e-9), 1)
 
 
 def _trial(symbols: tuple[ca.SX, ...], rates: ca.SX, tolerances: np.ndarray) -> ca.Function:

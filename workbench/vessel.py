@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
+from workbench.air import HEAT_CAPACITY_RATIO
 from workbench.balances import BalanceEquation
 from workbench.effect import (
     Balance,
@@ -55,6 +56,8 @@ class Vessel(GasVolume):
 class Bellows(Vessel):
     """A volume that gives way under its pressure: V = V_0 + V_line + C_b (p - p_atm).
 
+    kappa is a parameter here, because paper 004 fits it; the valve reads it, too.
+
     Source: paper 004 Eq. 1 and its future work (expansion); physics.md section 6
     (volume_expansion, line_volume).
     """
@@ -80,8 +83,13 @@ class Bellows(Vessel):
         ),
     )
 
+    heat_capacity_ratio: Expression = form(HEAT_CAPACITY_RATIO, lower=1.05, upper=1.67)
     expansion_m3_pa: Expression = strength(typical=2.5e-10, upper=5e-9)
     line_volume_m3: Expression = strength(typical=2e-5, upper=1e-3)
+
+    @property
+    def balance_exponent(self) -> Expression:
+        return self.heat_capacity_ratio
 
     def initial_volume_m3(self) -> Expression:
         return self.volume_m3 + self.line_volume_m3
@@ -90,6 +98,7 @@ class Bellows(Vessel):
         gauge_pa = now[self.name].pressure_pa - now["atmosphere"].pressure_pa
         grown_m3 = self.initial_volume_m3() + self.expansion_m3_pa * gauge_pa
         return super().derive(now) | {
+            "heat_capacity_ratio": self.heat_capacity_ratio,
             "volume_m3": ca.fmax(grown_m3, 0.1 * self.volume_m3),
             "compliance_m3_pa": self.expansion_m3_pa,
         }

@@ -9,7 +9,7 @@ Source: diagnosis.md 1.2 to 1.9.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from workbench.comparison.regimes import regime_shares
@@ -20,7 +20,9 @@ from workbench.diagnosis.judge import (
     CERTAIN_SHARE,
     CLEARLY_LESS,
     LEAST_TRAINING,
+    SAME_DIRECTION,
     SHARE_REASON,
+    alignment,
     predicts,
     reasons_against,
 )
@@ -162,8 +164,7 @@ def _followed(problem: Problem, where: Where | None, progress: Progress) -> _Fol
     for shift in [each for each in moved if each.leaves and each.drop > least][:SHIFTS_REFITTED]:
         progress(f"refit with {shift.name} free")
         refits.append(refit_shift(problem, shift, _best_share(refits)))
-    named = {profile.candidate.name for profile in profiles}
-    refits = _from_the_leader(problem, _best_first(problem, refits), named, progress)
+    refits = _from_the_leader(problem, _best_first(problem, refits), profiles, progress)
     shares = {each.profile.candidate.name: each.share for each in begun}
     return _Followed(profiles, shares, refits, moved)
 
@@ -175,27 +176,35 @@ def _best_first(problem: Problem, refits: Sequence[Refit]) -> list[Refit]:
 
 
 def _from_the_leader(
-    problem: Problem, refits: list[Refit], named: Collection[str], progress: Progress
+    problem: Problem, refits: list[Refit], profiles: Sequence[Profile], progress: Progress
 ) -> list[Refit]:
-    """Refits whose rivals begin once more where an accepted leader that leaves much ended.
+    """Refits with those of the leader's rivals that begin once more where it ended.
 
-    Fits end in different valleys, and then the leader may lead by its place alone.  ``named`` are
-    the effects: shifts of fitted parameters begin at the base.
+    Fits end in different valleys, and then the leader may lead by its place alone.  Rivals are
+    effects that do the same as an accepted leader, and where it leaves much all that were refitted;
+    shifts of fitted parameters begin at the base.
     """
+    by_name = {profile.candidate.name: profile for profile in profiles}
     leader = refits[0] if refits else None
-    if not leader or leader.candidate.name not in named or leader.drop_train > LEAVES_MUCH:
+    own = by_name.get(leader.candidate.name) if leader else None
+    if leader is None or own is None or reasons_against(problem.base, leader):
         return refits
-    if reasons_against(problem.base, leader):
-        return refits
-    found = [leader]
-    for each in refits[1:]:
-        if each.candidate.name in named:
-            progress(f"refit with {each.candidate.name} from another place")
-            own = {name: size.value for name, size in each.size.items()}
-            again = refit_from(problem, each.candidate, {**leader.fit.plant.values, **own})
-            each = min((each, again), key=lambda fitted: fitted.fit.cost)
-        found.append(each)
-    return _best_first(problem, found)
+    found = {each.candidate.name: each for each in refits}
+    rivals = [name for name in found if name in by_name and leader.drop_train < LEAVES_MUCH]
+    rivals += [n for n, p in by_name.items() if abs(alignment(own, p)) > SAME_DIRECTION]
+    for name in dict.fromkeys(rivals):
+        if name != leader.candidate.name:
+            progress(f"refit with {name} from another place")
+            again = _beside(problem, leader, by_name[name], found.get(name))
+            found[name] = min((again, found.get(name, again)), key=lambda each: each.fit.cost)
+    return _best_first(problem, [*found.values()])
+
+
+def _beside(problem: Problem, leader: Refit, rival: Profile, known: Refit | None) -> Refit:
+    """A rival refitted from where the leader ended, with its own size, or else that of the scan."""
+    size = {name: each.value for name, each in known.size.items()} if known else {}
+    own = size or rival.trials[0].values
+    return refit_from(problem, rival.candidate, {**leader.fit.plant.values, **own})
 
 
 def _shortlist(

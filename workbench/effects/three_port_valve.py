@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from workbench.air import IsoLaw, NozzleLaw
+from workbench.air import IsoLaw, NozzleLaw, choked_constant
 from workbench.effect import (
     Balance,
     Cause,
@@ -25,7 +25,7 @@ from workbench.effects.spool_causes import (
     SPOOL_LEAK,
     SUPPLY_RESTRICTION,
 )
-from workbench.port import port, spool_flow_kg_s
+from workbench.port import ChokedShare, port, spool_flow_kg_s
 from workbench.spool import OpeningLaw, SmoothOpening, area_share, shut_while_stuck
 from workbench.vessel import PressureRate
 
@@ -119,9 +119,10 @@ class ThreePortValve(SpoolOpening):
     mdot = a_f phi(p_src, p) - a_v phi(p, p_atm),   phi by the nozzle law, direction by pressures
     a    = C (1 +- e) A_max A/A_max,   + where gas enters the chamber, - where it leaves
 
-    alpha and beta of the paper are C times C_sub and C_chk with Z R/M as gas constant.  Its theta
-    compares p_u/p_d, the inverse of the other papers' ratio (erratum E004-5).  The slope at equal
-    pressures is infinite as printed; the straight line of physics.md 1.1 c repairs it (E004-2).
+    kappa is the chamber's; alpha and beta of the paper are C times C_sub and C_chk with Z R/M as
+    gas constant.  Its theta compares p_u/p_d, the inverse of the other papers' ratio (erratum
+    E004-5).  The slope at equal pressures is infinite as printed; the straight line of physics.md
+    1.1 c repairs it (E004-2).
 
     Source: paper 004 Eqs. 1 to 4; C may differ for filling and venting there.
     """
@@ -154,18 +155,25 @@ class ThreePortValve(SpoolOpening):
 
     def terms(self, now: Conditions) -> Iterator[MassFlow]:
         paths, (fill, vent) = port(now, self.chamber), self.shares(now)
+        kappa = now[self.chamber].heat_capacity_ratio
         full_m2 = self.discharge_coefficient * self.flow_area_m2
+        full_m2 *= choked_constant(1.0, kappa) / choked_constant(1.0)
         filling_m2 = full_m2 * fill * (1.0 - self.supply_restriction_share)
         venting_m2 = full_m2 * vent * (1.0 - self.exhaust_restriction_share)
-        law, leak_m2, asymmetry = self._law, self.leak_area_m2, self.discharge_asymmetry
+        law, leak_m2, asymmetry = self._law(kappa), self.leak_area_m2, self.discharge_asymmetry
         into_kg_s = spool_flow_kg_s(paths.charge, filling_m2, law, leak_m2, asymmetry)
         out_kg_s = spool_flow_kg_s(paths.vent, venting_m2, law, leak_m2, -asymmetry)
         yield from paths.flows(into_kg_s, out_kg_s, law, law)
 
-    def _law(self, ratio: Expression) -> Expression:
+    def _law(self, kappa: Expression) -> ChokedShare:
         """Flow over the choked flow: between the nozzle's and that of ISO 6358."""
-        nozzle = NozzleLaw()(ratio)
-        return nozzle + self.iso_share * (IsoLaw(self.critical_ratio)(ratio) - nozzle)
+        hole, iso = NozzleLaw(kappa), IsoLaw(self.critical_ratio)
+
+        def law(ratio: Expression) -> Expression:
+            nozzle = hole(ratio)
+            return nozzle + self.iso_share * (iso(ratio) - nozzle)
+
+        return law
 
 
 @dataclass(frozen=True, kw_only=True)
