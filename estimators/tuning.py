@@ -17,7 +17,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from workbench.filter_passes import log_likelihoods_of_noise, recording_filter
+from workbench.filter_likelihoods import log_likelihoods_of_noise
+from workbench.filter_passes import recording_filter
 from workbench.plant import Plant
 from workbench.recording import Recording
 

@@ -7,14 +7,12 @@ Python in the loop over them.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import casadi as ca
 import numpy as np
 
-from workbench.called import called, result
+from workbench.called import called
 from workbench.filtering import consistent_start, smoothed
 from workbench.plant import Plant
 from workbench.plant_filter import PlantFilter
@@ -77,80 +75,7 @@ def smooth(found: PlantFilter, recording: Recording, factor: float = 1.0) -> Fil
     return _joined(found, [_smoothed(_run(found, p, factor=factor)) for p in recording.pieces])
 
 
-def log_likelihoods(found: PlantFilter, recording: Recording, factors: np.ndarray) -> np.ndarray:
-    """Log-likelihood of a recording at several intensities of the unknown inputs, side by side.
-
-    ``factors`` (n_w, n) multiply the intensities of ``found``; 0 switches an input off.  Returns
-    shape (n,), not finite where a run was lost.
-    """
-    pairs = zip(*(_covariances(found, column) for column in factors.T), strict=True)
-    return _likelihoods(found, recording, *map(np.array, pairs))
-
-
-def log_likelihoods_of_noise(
-    found: PlantFilter, recording: Recording, noises: np.ndarray
-) -> np.ndarray:
-    """The same for several process noises, (n, n_x): what states gain per square root of a second.
-
-    Unknown inputs keep their intensity.
-    """
-    relative = np.pad(noises / found.plant.scale, ((0, 0), (0, len(found.unknown_inputs))))
-    step_s = found.sample_time_s * found.decimate
-    walks = np.diag([*np.zeros(len(found.plant.scale)), *np.ones(len(found.unknown_inputs))])
-    Q = step_s * walks + step_s * relative[:, :, None] ** 2 * np.eye(len(found.scale))
-    return _likelihoods(found, recording, np.tile(found.start_covariance, (len(Q), 1, 1)), Q)
-
-
-def _likelihoods(
-    found: PlantFilter, recording: Recording, starts: np.ndarray, steps: np.ndarray
-) -> np.ndarray:
-    """Log-likelihood for each pair of start and step covariance, (n, n_X, n_X) both; (n,)."""
-    n = len(starts)
-    P, Q = (each.reshape(n, -1).T for each in (starts, steps))
-    total = np.zeros((1, n))
-    block, one = found.likelihood.fold(BLOCK), found.likelihood
-    threads = min(n, os.cpu_count() or 1)
-    runs, last = (block.map(n, "thread", threads), block), (one.map(n), one)
-    for piece in recording.pieces:
-        start, columns = _posed(found, piece)
-        now = np.vstack([np.tile(start[:, None], n), P, Q, total])
-        whole = columns[-1].shape[1] // BLOCK * BLOCK
-        for part in _blocks(columns, slice(0, whole), BLOCK):
-            now = _side_by_side(*runs, now, part)
-        for part in _blocks(columns, slice(whole, columns[-1].shape[1]), 1):
-            now = _side_by_side(*last, now, part)
-        total = now[-1:]
-    return total.ravel()
-
-
-def _side_by_side(
-    runs: ca.Function, one: ca.Function, now: np.ndarray, part: Sequence[np.ndarray]
-) -> np.ndarray:
-    """All runs after a part of the recording, (n_state, n); a lost one is NaN from there on.
-
-    The filter of a run that leaves all bounds fails in its linear equations, and with it the call
-    for all: then each goes on alone.  A lost run computes with the numbers of another.
-    """
-    lost = ~np.isfinite(now).all(axis=0)
-    if lost.all():
-        return now
-    going = np.where(lost, now[:, [int(np.argmin(lost))]], now)
-    try:
-        after = result(runs, going, *(np.tile(each, now.shape[1]) for each in part))
-    except RuntimeError:
-        after = np.column_stack([_alone(one, column, part) for column in going.T])
-    return np.where(lost, np.nan, after)
-
-
-def _alone(one: ca.Function, now: np.ndarray, part: Sequence[np.ndarray]) -> np.ndarray:
-    """One run after a part of the recording; NaN where it is lost."""
-    try:
-        return result(one, now, *part)[:, 0]
-    except RuntimeError:
-        return np.full(len(now), np.nan)
-
-
-def _blocks(
+def blocks(
     columns: Sequence[np.ndarray], span: slice, size: int
 ) -> Iterator[tuple[np.ndarray, ...]]:
     """Columns of a span of samples, so many at a time; u and d have several for a sample."""
@@ -212,7 +137,7 @@ class _Pass:
     log_likelihood: float
 
 
-def _posed(found: PlantFilter, piece: Recording) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
+def posed(found: PlantFilter, piece: Recording) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
     """Start, and by sample of the filter the columns u, d, p, y and received."""
     plant, m = found.plant, found.decimate
     u, d = inputs(plant, piece)
@@ -232,7 +157,7 @@ def _posed(found: PlantFilter, piece: Recording) -> tuple[np.ndarray, tuple[np.n
     return start, (u, d, values, np.where(received, y, 0.0), received)
 
 
-def _covariances(found: PlantFilter, factors: np.ndarray) -> tuple[np.ndarray, ...]:
+def covariances(found: PlantFilter, factors: np.ndarray) -> tuple[np.ndarray, ...]:
     """Start and step covariance with the intensities of the unknown inputs times (n_w,)."""
     size = np.pad(factors, (len(found.scale) - len(factors), 0), constant_values=1.0)
     return tuple(np.outer(size, size) * c for c in (found.start_covariance, found.step_covariance))
@@ -242,8 +167,8 @@ def _run(
     found: PlantFilter, piece: Recording, guessed: np.ndarray | None = None, factor: float = 1.0
 ) -> _Pass:
     """The filter over one gap-free piece, from a guessed state, (n_x,), where there is one."""
-    start, columns = _posed(found, piece)
-    P0, Q = _covariances(found, np.full(len(found.unknown_inputs), factor))
+    start, columns = posed(found, piece)
+    P0, Q = covariances(found, np.full(len(found.unknown_inputs), factor))
     if guessed is not None:
         start[: len(guessed)] = guessed / found.plant.scale
     received = columns[-1]
@@ -273,7 +198,7 @@ def _passed(
     many = found.sample.mapaccum("filter", BLOCK, 2)
     samples, size, Q = columns[-1].shape[1], len(X), np.tile(Q, BLOCK)
     rows = []
-    for part in _blocks([_filled(each, samples) for each in columns], slice(0, samples), BLOCK):
+    for part in blocks([_filled(each, samples) for each in columns], slice(0, samples), BLOCK):
         every_X, every_P, *told = called(many, X, P, *part, Q)
         X, P = every_X[:, -1], every_P[:, -size:]
         rows.append(tuple(told))

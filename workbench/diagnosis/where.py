@@ -31,7 +31,8 @@ from workbench.diagnosis.missing_term import Course, Intensities
 from workbench.diagnosis.result import Where
 from workbench.diagnosis.suspects import Suspect, suspects, wandering, with_missing_flows
 from workbench.effect import Balance
-from workbench.filter_passes import FilterResult, log_likelihoods, recording_filter, smooth
+from workbench.filter_likelihoods import log_likelihoods
+from workbench.filter_passes import FilterResult, recording_filter, smooth
 from workbench.fitting.problem import Problem
 from workbench.fitting.window_length import moves
 from workbench.plant import Plant
