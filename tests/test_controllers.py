@@ -4,8 +4,8 @@ import pickle
 
 import numpy as np
 import pytest
+from slide_controllers import SLIDE_CONTROLLERS
 
-from controllers import CONTROLLERS
 from controllers.condensed import MpcSpec
 from controllers.design_file import design, read_design, write_design
 from controllers.linear_mpc import limited_plan, linear_mpc
@@ -18,7 +18,7 @@ from workbench.effects import DeadZone, ValveOffset
 from workbench.errors import InputError
 from workbench.plants.servo_drive import COMMAND, servo_drive
 
-everyone = pytest.mark.parametrize("name", CONTROLLERS)
+everyone = pytest.mark.parametrize("name", SLIDE_CONTROLLERS)
 REST = np.array([0.145, 0.0, 5.65e5, 5.65e5])
 
 
@@ -29,7 +29,7 @@ def hybrid():
 
 @pytest.fixture(scope="module")
 def controllers(hybrid):
-    return {name: m.design(hybrid, m.spec()) for name, m in CONTROLLERS.items()}
+    return {name: m.design(hybrid, m.spec()) for name, m in SLIDE_CONTROLLERS.items()}
 
 
 def seen(state):
@@ -125,7 +125,7 @@ def test_a_wrong_number_in_a_design_is_an_error_that_names_it():
         design("lq", servo_drive(), {"positon_m": 1e-3})
     with pytest.raises(InputError, match=r"lq\.position_m is 'far'; expected a number above 0"):
         design("lq", servo_drive(), {"position_m": "far"})
-    with pytest.raises(KeyError, match="no controller lqg; there is pid, lq, mpc, cascade"):
+    with pytest.raises(KeyError, match="no controller lqg; there is pid, lq, mpc, cascade, hybrid"):
         design("lqg", servo_drive())
 
 
