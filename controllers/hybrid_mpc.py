@@ -33,9 +33,9 @@ from controllers.shift_prediction import (
 )
 from controllers.spec import ranged
 from controllers.switching_plans import Plans, plans, switching_times
-from controllers.valve_response import MASK, ValveResponse, age, packed, valve_response
 from linearize.modes import HybridModel
 from linearize.shifting import STATES
+from linearize.valve_response import MASK, ValveResponse, age, packed, valve_response
 from workbench.called import called
 from workbench.contracts import Command, Estimate
 from workbench.errors import InputError, Message

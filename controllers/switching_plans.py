@@ -11,7 +11,7 @@ from functools import cache
 
 import numpy as np
 
-from controllers.valve_response import packed
+from linearize.valve_response import packed
 
 INSTANTS = (0, 1, 2, 4, 7, 10, 14)  # samples ahead, fine where a plan is about to be carried out
 NEVER = 1e6  # switches of what only fills up a set: it is never chosen
@@ -22,7 +22,7 @@ class Plans:
     """Plans of one valve, filled up to the size of the largest set with plans that count as none.
 
     commands    shape (n, N)
-    packed      the same as integers, see :func:`controllers.valve_response.packed`
+    packed      the same as integers, see :func:`linearize.valve_response.packed`
     switches    of each, shape (n,)
     """
 

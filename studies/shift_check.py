@@ -12,16 +12,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
-from controllers.shift_prediction import drives, half_stroke_m
-from estimators import ESTIMATORS
-from estimators.ahead import in_time
-from linearize.shifting import POSITION, VELOCITY
+from controllers.shift_prediction import drives
+from estimators.shift_filter import ShiftFilter
+from linearize.shift_sample import half_stroke_m
+from linearize.shifting import POSITION, PRESSURES, VELOCITY
 from studies.text import columns, number
 from workbench.closed_loop import Hardware, LoopRecord, close_loop
-from workbench.contracts import Command, Controller, Estimate, Estimator
+from workbench.contracts import Command, Controller, Estimate
 from workbench.filtering import consistent_start
 from workbench.plant import Plant
 from workbench.plants.gearbox import FINGER_M, FLOATING, MAIN
@@ -29,16 +30,12 @@ from workbench.plants.gearbox import FINGER_M, FLOATING, MAIN
 SAMPLE_TIME_S, LASTS_S = 2.5e-4, 0.08
 SETTLED_M, OVERSHOT_M = 0.3e-3, 0.5e-3
 SLOWER, SOFTER, SOFT_M_S = 1.25, 0.5, 0.5
-NOISE = {"chamber_1.pressure_pa": 1e3, "chamber_2.pressure_pa": 1e3, POSITION: 2e-5}
+NOISE = {**dict.fromkeys(PRESSURES, 1e3), POSITION: 2e-5}
 PROCESS = {
-    VELOCITY: 2.0,
-    f"{FLOATING}.velocity_m_s": 2.0,
-    "finger.velocity_rad_s": 40.0,
     "chamber_1.pressure_pa": 2e5,
     "chamber_2.pressure_pa": 2e5,
-    "control_chamber.pressure_pa": 2e4,
-    "chamber_1.mass_kg": 3e-5,
-    "chamber_2.mass_kg": 5e-5,
+    POSITION: 1e-4,
+    VELOCITY: 2.0,
 }
 SHIFTS = {"n-h": (0.0, 1.0), "h-n": (1.0, 0.0), "n-l": (0.0, -1.0), "l-n": (-1.0, 0.0)}
 """Start and target of each shift in half strokes, by its name on the command line."""
@@ -71,7 +68,6 @@ class Shift:
     """
 
     design: str
-    estimator: str
     scenario: str
     settling_s: float
     impact_m_s: float
@@ -101,44 +97,51 @@ class ShiftCheck:
 def check_shifts(
     plant: Plant,
     designs: Mapping[str, Controller],
-    estimators: Iterable[str],
     scenarios: Iterable[str],
     *,
     believed: Plant | None = None,
     seed: int = 0,
 ) -> ShiftCheck:
-    """Every design with every estimator in every shift, each beside the open loop.
+    """Every design in every shift, each beside the open loop.
 
     Parameters
     ----------
     believed
-        The plant in the estimators, the same one by default.
+        The plant in the estimator, the same one by default.
     """
-    truth, model, names = plant.lean(), (believed or plant).lean(), tuple(estimators)
+    truth, model = plant.lean(), (believed or plant).lean()
     leading, rows, records = drives(plant, 1e-3), [], []
     for scenario in scenarios:
         target_m = SHIFTS[scenario][1] * half_stroke_m(plant)
         open_loop = Drive(leading[target_m])
-        bound = _measured(truth, run(truth, open_loop, model, "ekf", scenario, seed), scenario)
+        bound = _measured(
+            truth, run(truth, open_loop, shift_filter(model, 1e-3), scenario, seed), scenario
+        )
         for design, controller in designs.items():
-            for name in names:
-                record = run(truth, controller, model, name, scenario, seed)
-                found = _measured(truth, record, scenario)
-                rows.append(
-                    replace(
-                        found,
-                        design=design,
-                        estimator=name,
-                        longest_s=SLOWER * bound.settling_s,
-                        hardest_m_s=max(SOFTER * bound.impact_m_s, SOFT_M_S),
-                    )
+            observer = shift_filter(model, controller.sample_time_s)
+            record = run(truth, controller, observer, scenario, seed)
+            rows.append(
+                replace(
+                    _measured(truth, record, scenario),
+                    design=design,
+                    longest_s=SLOWER * bound.settling_s,
+                    hardest_m_s=max(SOFTER * bound.impact_m_s, SOFT_M_S),
                 )
-                records.append(record)
+            )
+            records.append(record)
     return ShiftCheck(tuple(rows), tuple(records))
 
 
+@cache
+def shift_filter(plant: Plant, sample_time_s: float) -> ShiftFilter:
+    """The estimator of a plant, made once: its tables take longer than a shift."""
+    return ShiftFilter(
+        plant=plant, sample_time_s=sample_time_s, measurement_noise=NOISE, process_noise=PROCESS
+    )
+
+
 def run(
-    plant: Plant, controller: Controller, believed: Plant, estimator: str, scenario: str, seed: int
+    plant: Plant, controller: Controller, estimator: ShiftFilter, scenario: str, seed: int
 ) -> LoopRecord:
     """One shift from rest, vented, with the noise of the sensors."""
     start, target = (share * half_stroke_m(plant) for share in SHIFTS[scenario])
@@ -148,26 +151,12 @@ def run(
     return close_loop(
         plant,
         controller,
-        shift_estimator(estimator, believed, controller.sample_time_s),
+        estimator,
         {POSITION: np.full(n, target)},
         initial=consistent_start(plant, places),
         hardware=Hardware(noise=NOISE),
         sample_time_s=SAMPLE_TIME_S,
         seed=seed,
-    )
-
-
-def shift_estimator(name: str, plant: Plant, sample_time_s: float) -> Estimator:
-    """An estimator of the registry with the noise of the gearbox."""
-    process = {key: size for key, size in PROCESS.items() if key in plant.model.states}
-    return in_time(
-        ESTIMATORS[name](
-            plant=plant,
-            sample_time_s=sample_time_s,
-            measurement_noise=NOISE,
-            process_noise=process,
-        ),
-        plant,
     )
 
 
@@ -184,7 +173,6 @@ def _measured(plant: Plant, record: LoopRecord, scenario: str) -> Shift:
     commands = recording.rows(plant.model.commands)
     return Shift(
         design="open loop",
-        estimator="-",
         scenario=scenario,
         settling_s=settled * SAMPLE_TIME_S if settled < len(gone) else np.inf,
         impact_m_s=impact_m_s(record, end_m),
@@ -217,7 +205,7 @@ def impact_m_s(record: LoopRecord, end_m: float) -> float:
     return float(hardest)
 
 
-HEAD = ("design", "estimator", "shift", "reached", "settle ms", "at most", "impact m/s", "at most",
+HEAD = ("design", "shift", "reached", "settle ms", "at most", "impact m/s", "at most",
         "over mm", "air g", "switches", "ctrl us", "p99 us")  # fmt: skip
 
 
@@ -232,5 +220,5 @@ def _row(row: Shift) -> tuple[str, ...]:
         1e3 * row.overshoot_m, 1e3 * row.air_kg, row.switches,
         1e6 * row.solve_median_s, 1e6 * row.solve_p99_s,
     )  # fmt: skip
-    words = (row.design, row.estimator, row.scenario, "yes" if row.reached else "no")
+    words = (row.design, row.scenario, "yes" if row.reached else "no")
     return (*words, *(number(value, 4) for value in numbers))

@@ -72,6 +72,16 @@ class ValveResponse:
             raise ValueError(f"a plan switches a valve twice within {self.hold} samples")
         return self.shares[places]
 
+    def newest(self, history: int) -> float:
+        """Share over the sample of the newest command.
+
+        Raises
+        ------
+        ValueError
+            If the history does not keep ``hold``.
+        """
+        return float(self.ahead(history >> 1, np.array([history & 1]))[0])
+
     def keeps(self, past: int, plans: np.ndarray) -> np.ndarray:
         """True for each plan that switches no sooner than ``hold`` allows, shape (...,)."""
         return (self._found(past, plans) >= 0).all(axis=-1)
