@@ -174,7 +174,7 @@ class HybridMpc:
         self, x: np.ndarray, query: np.ndarray, sent: tuple[int, int], before: np.ndarray
     ) -> np.ndarray:
         """The best pairs of plans under the modes along the last plan, shape (judged, 2, N)."""
-        N, both = self.spec.horizon, [self._plans(s) for s in sent]
+        N, both = self.spec.horizon, [self.plans(s) for s in sent]
         along = np.array(self._shares(sent, before))
         way, slope = called(self.prediction.linearised, x, along)
         moved = [
@@ -206,7 +206,8 @@ class HybridMpc:
         pairs = zip(self.responses, sent, commands, strict=True)
         return [response.ahead(s, packed(ahead)) for response, s, ahead in pairs]
 
-    def _plans(self, sent: int) -> Plans:
+    def plans(self, sent: int) -> Plans:
+        """What one valve may do after these commands."""
         hold = self.responses[0].hold
         return plans(sent & 1, max(hold - age(sent), 0), hold, self.spec.horizon)
 

@@ -93,6 +93,16 @@ class ShiftCheck:
     rows: tuple[Shift, ...]
     records: tuple[LoopRecord, ...]
 
+    goal = (
+        "missed: 1.25 times the time of the open loop, half of its landing speed or 0.5 m/s, "
+        "0.5 mm past Neutral"
+    )
+
+    @property
+    def text(self) -> str:
+        """All rows as a table."""
+        return shift_table(self.rows)
+
 
 def check_shifts(
     plant: Plant,
