@@ -4,7 +4,8 @@ Two valves are on or off, each for a least time.  At every sample
 
 1. the last plan, shifted, is run through the reduced model, which is linearised along it;
 2. under these affine modes every pair of plans of the two valves is ranked, exactly;
-3. the best of them, and the last plan, are run through the nonlinear model, and the best is taken.
+3. the best of them, the last plan with one switch moved, and no switch at all are run through the
+   nonlinear model, and the best is taken.
 
 So the search is exhaustive over the blocked sequences on the affine modes, and its work is the same
 at every sample.  What the affine modes miss (a stop, the side of Neutral, flows that turn subsonic)
@@ -13,8 +14,9 @@ is judged by the nonlinear model: a plan is only changed for one that this prefe
 A shift is fast and lands softly by its cost, see :mod:`controllers.shift_cost`; a switch has
 a price, and what lies within the tolerance costs nothing, so that at rest nothing switches.
 
-Source: paper 003 Sec. V for the modes; branch and bound over binaries (DAQP) is the alternative,
-compared in ``tests/benchmarks/test_speed_of_hybrid_mpc.py``.
+Without an estimate that is finite the last plan goes on.
+
+Source: paper 003 Sec. V for the modes.
 """
 
 from __future__ import annotations
@@ -153,9 +155,12 @@ class HybridMpc:
         self, x: np.ndarray, query: np.ndarray, sent: tuple[int, int], before: np.ndarray
     ) -> tuple[np.ndarray, Mapping[str, float]]:
         """The plan, shape (2, N), and what is noted of the search."""
-        moved = self._moved(sent, before)[: self.spec.judged - 1]
-        ranked = self._ranked(x, query, sent, before)[: self.spec.judged - len(moved)]
-        asked = np.concatenate([before[None], moved, ranked])
+        if not np.isfinite(x).all():
+            return before, {"fallback": 1.0}
+        held = np.repeat([[[s & 1] for s in sent]], self.spec.horizon, axis=2)
+        near = np.concatenate([before[None], held, self._moved(sent, before)])[: self.spec.judged]
+        ranked = self._ranked(x, query, sent, before)[: self.spec.judged + 1 - len(near)]
+        asked = np.concatenate([near, ranked])
         shares = self._shares(sent, asked.transpose(1, 0, 2))
         costs = called(self.prediction.judged, x, np.reshape(shares, (2, -1)), query)[0].ravel()
         standing = np.broadcast_to([[s & 1] for s in sent], (len(asked), 2, 1))
@@ -163,12 +168,8 @@ class HybridMpc:
         costs = costs + self._price * switches
         costs[~np.isfinite(costs)] = np.inf
         best = int(np.argmin(costs))
-        notes = {
-            "cost_s": float(costs[best]) * self.sample_time_s,
-            "changed": float(best > 0),
-            "fallback": float(costs[best] == np.inf),
-        }
-        return asked[best], notes
+        cost_s = float(costs[best]) * self.sample_time_s
+        return asked[best], {"cost_s": cost_s, "changed": float(best > 0), "fallback": 0.0}
 
     def _ranked(
         self, x: np.ndarray, query: np.ndarray, sent: tuple[int, int], before: np.ndarray
