@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from studies import (
     controllers_study,
+    gear_shift_study,
     hidden_study,
     identification_study,
     mode_placement,
@@ -15,6 +16,7 @@ STUDIES: dict[str, Study] = {
     study.name: study
     for study in (
         controllers_study.STUDY,
+        gear_shift_study.STUDY,
         hidden_study.STUDY,
         identification_study.STUDY,
         mode_placement.STUDY,
