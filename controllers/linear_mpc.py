@@ -11,7 +11,7 @@ the error: the prediction feels it and the target pressures balance it.  Inputs 
 states softly, so that the program always has a solution.
 
 Where the unconstrained optimum keeps all limits it is the solution, and DAQP is not asked.  DAQP is
-exact and eight times faster here than OSQP with polish; ``tests/benchmarks/test_speed_of_mpc.py``
+exact and three times faster here than OSQP with polish; ``tests/benchmarks/test_speed_of_mpc.py``
 prints both.
 """
 
