@@ -9,6 +9,7 @@ import numpy as np
 
 from workbench.contracts import Estimate
 from workbench.effects.valve_command import CommandDelay
+from workbench.filtering import consistent_start
 from workbench.plant import Plant
 
 
@@ -41,10 +42,20 @@ class Ahead:
         late = self.delay_s / self.sample_time_s
         now = self.inner.update(before, self._at(sent, -late), measurement)
         step, (_, d, p) = self.plant.model.step(self.sample_time_s), self.plant.nominal
-        x = now.state
+        x, places = self._whole(now)
         for k in range(1, round(late) + 1):
             x = step(x, self._at(sent, k - late), d, p).full().ravel()
-        return replace(now, state=x, memory=(now, sent))
+        return replace(now, state=x[places], memory=(now, sent))
+
+    def _whole(self, now: Estimate) -> tuple[np.ndarray, list[int]]:
+        """The plant's state with what is estimated, and the places of that; the rest follows."""
+        states = self.plant.model.states
+        places = [states.index(name) for name in now.names]
+        if len(places) == len(states):
+            return now.state, places
+        x = consistent_start(self.plant, dict(zip(now.names, now.state, strict=True)))
+        x[places] = now.state
+        return x, places
 
     @staticmethod
     def _at(sent: tuple[np.ndarray, ...], samples: float) -> np.ndarray:

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from workbench.contracts import Estimate
+from workbench.filter_update import FilterUpdate
 from workbench.filtering import consistent_start
 from workbench.plant import Plant
 from workbench.plant_filter import PlantFilter
@@ -18,6 +19,9 @@ from workbench.plant_filter import PlantFilter
 class ExtendedKalman:
     """Predict with the plant, correct with its Jacobian; see :class:`PlantFilter`.
 
+    The notes hold the normalised innovation squared of a sample, ``nis``, of as many degrees of
+    freedom as outputs were ``received``, and each unknown input.
+
     Attributes
     ----------
     measurement_noise
@@ -26,6 +30,8 @@ class ExtendedKalman:
         Standard deviation that a state gains per square root of a second.
     unknown_inputs
         The same for an unknown rate of a state; its estimate stands in the notes.
+    initial_deviation
+        Standard deviation at the start by state, the plant's scale by default.
     """
 
     plant: Plant
@@ -33,6 +39,7 @@ class ExtendedKalman:
     measurement_noise: Mapping[str, float]
     process_noise: Mapping[str, float]
     unknown_inputs: Mapping[str, float] = field(default_factory=dict)
+    initial_deviation: Mapping[str, float] = field(default_factory=dict)
 
     def start(self, measurement: np.ndarray) -> Estimate:
         found = self.filter
@@ -42,21 +49,31 @@ class ExtendedKalman:
         return self.estimate(X, found.start_covariance)
 
     def update(self, last: Estimate, command: np.ndarray, measurement: np.ndarray) -> Estimate:
-        found, (_, d, p) = self.filter, self.plant.nominal
-        X, P, _ = found.predict(*last.memory, command, d, p)
         received = np.isfinite(measurement)
         y = np.where(received, measurement, 0.0)
-        X, P, *_ = found.correct(X, P, command, d, p, y, received)
-        return self.estimate(X.full().ravel(), P.full())
+        now = self.sample(*last.memory, command, y, received)
+        notes = self._unknown(now.X) | {"nis": now.nis, "received": float(received.sum())}
+        memory = (now.X, now.P)
+        return Estimate(self.plant.model.states, now.state, now.covariance, memory, notes)
 
     def estimate(self, X: np.ndarray, P: np.ndarray) -> Estimate:
+        """What a scaled state and its covariance stand for."""
         n, scale = len(self.plant.scale), self.filter.scale
-        notes = {
-            f"unknown {name}": value
-            for name, value in zip(self.unknown_inputs, X[n:] * scale[n:], strict=True)
-        }
         covariance = P[:n, :n] * np.outer(scale[:n], scale[:n])
-        return Estimate(self.plant.model.states, X[:n] * scale[:n], covariance, (X, P), notes)
+        state = X[:n] * scale[:n]
+        return Estimate(self.plant.model.states, state, covariance, (X, P), self._unknown(X))
+
+    def _unknown(self, X: np.ndarray) -> dict[str, float]:
+        if not self.unknown_inputs:
+            return {}
+        n, scale = len(self.plant.scale), self.filter.scale
+        values = zip(self.unknown_inputs, X[n:] * scale[n:], strict=True)
+        return {f"unknown {name}": value for name, value in values}
+
+    @cached_property
+    def sample(self) -> FilterUpdate:
+        """Predict and correct as one call."""
+        return FilterUpdate(self.filter)
 
     @cached_property
     def filter(self) -> PlantFilter:
@@ -67,4 +84,5 @@ class ExtendedKalman:
             measurement_noise=self.measurement_noise,
             process_noise=self.process_noise,
             unknown_inputs=self.unknown_inputs,
+            initial_deviation=self.initial_deviation,
         )

@@ -75,7 +75,7 @@ class SampledHybrid:
             z = np.column_stack([x, np.broadcast_to(now, (len(x), u.shape[2])), np.ones(len(x))])
             states[k], modes[k] = x, self.active(z)
             later = np.einsum("wij,wj->wi", self.steps[modes[k]], z)
-            x = self._stopped(x, later)
+            x = self.stopped(x, later)
         states = states.transpose(2, 0, 1)
         return HybridRun(states[..., 0], modes[:, 0]) if single else HybridRun(states, modes)
 
@@ -112,7 +112,7 @@ class SampledHybrid:
             raise LookupError(f"no mode of {self.hybrid.model.plant.name} covers {told}")
         return covered.argmax(axis=1)
 
-    def _stopped(self, x: np.ndarray, later: np.ndarray) -> np.ndarray:
+    def stopped(self, x: np.ndarray, later: np.ndarray) -> np.ndarray:
         """Later states, inside of a holding interval where a step would jump across it."""
         intervals = {hold.interval for holds in self.holds.values() for hold in holds}
         for column, below, above, inside in intervals:

@@ -113,12 +113,12 @@ class DesignModel:
     @cached_property
     def f(self) -> ca.Function:
         """(x, u) -> (dx/dt, y), x the kept states."""
-        return ca.Function("design", [*self.symbols], [*self._expressions])
+        return ca.Function("design", [*self.symbols], [*self.expressions])
 
     @cached_property
     def jacobians(self) -> ca.Function:
         """(x, u) -> (A, B, C, D)."""
-        blocks = [ca.jacobian(e, s) for e in self._expressions for s in self.symbols]
+        blocks = [ca.jacobian(e, s) for e in self.expressions for s in self.symbols]
         return ca.Function("jacobians", [*self.symbols], blocks)
 
     @cached_property
@@ -172,7 +172,7 @@ class DesignModel:
         return ca.substitute(expressions, [d, p], numbers)
 
     @cached_property
-    def _expressions(self) -> tuple[ca.SX, ca.SX]:
+    def expressions(self) -> tuple[ca.SX, ca.SX]:
         _, rates, outputs = self._substituted
         own = rates[[self.plant.model.states.index(name) for name in self.states]]
         rows = {
@@ -211,8 +211,8 @@ def offset(plant: Plant, name: str) -> float:
 
 def _passed_over(plant: Plant, state: str) -> bool:
     member, _, quantity = state.rpartition(".")
-    owner = next(m for m in plant.members if m.name == member)
-    return quantity == "mass_kg" or isinstance(owner, INSIDE)
+    owner = next((m for m in plant.members if m.name == member), None)
+    return owner is not None and (quantity == "mass_kg" or isinstance(owner, INSIDE))
 
 
 def _stand_in(plant: Plant, state: str) -> Expression:

@@ -138,6 +138,13 @@ def test_the_smoother_equals_rauch_tung_striebel():
     assert (covariances[:-1, 0, 0] < P[:-1, 0, 0]).all()
 
 
+def in_scales(estimate, plant):
+    """Covariance of the states that an estimator has, in units of their scales."""
+    sizes = dict(zip(plant.model.states, plant.scale, strict=True))
+    size = np.array([sizes[name] for name in estimate.names])
+    return estimate.covariance / np.outer(size, size)
+
+
 @everyone
 def test_an_estimator_predicts_when_nothing_is_received(name):
     plant = servo_drive().lean()
@@ -147,7 +154,7 @@ def test_an_estimator_predicts_when_nothing_is_received(name):
     after = estimator.update(begun, plant.nominal[0], np.full(3, np.nan))
 
     assert after.pick(OUTPUTS) == pytest.approx([0.145, 5.65e5, 5.65e5], rel=1e-3)
-    assert np.linalg.eigvalsh(after.covariance / np.outer(plant.scale, plant.scale)).min() > -1e-9
+    assert np.linalg.eigvalsh(in_scales(after, plant)).min() > -1e-9
 
 
 @everyone
@@ -158,7 +165,8 @@ def test_a_measurement_never_makes_a_state_less_certain(name):
     blind = estimator.update(begun, plant.nominal[0], np.full(3, np.nan))
     seeing = estimator.update(begun, plant.nominal[0], at)
 
-    assert ((blind.covariance - seeing.covariance).diagonal() / plant.scale**2).min() > -1e-9
+    gained = in_scales(blind, plant) - in_scales(seeing, plant)
+    assert gained.diagonal().min() > -1e-9
 
 
 @everyone
@@ -255,6 +263,18 @@ def test_intensities_side_by_side_are_as_likely_as_one_after_the_other(recorded)
         alone = {n: q * f for (n, q), f in zip(walks.items(), factors, strict=True) if f}
         known = recording_filter(servo_drive(), part, alone, process_noise=process, decimate=4)
         assert likelihood == pytest.approx(filter_pass(known, part).log_likelihood, abs=1e-6)
+
+
+def test_a_run_that_is_lost_leaves_the_others_as_they_are(recorded):
+    _, _, recording = recorded
+    part = recording.part(0, 600)
+    many = recording_filter(servo_drive(), part, {VELOCITY: 2.0}, decimate=4)
+    alone = log_likelihoods(many, part, np.array([[1.0]]))
+
+    found = log_likelihoods(many, part, np.array([[1e20, 1.0, 1e6]]))
+
+    assert list(np.isfinite(found)) == [False, True, False]
+    assert found[1] == pytest.approx(alone[0], abs=1e-9)
 
 
 def test_a_start_keeps_the_gas_at_its_temperature():

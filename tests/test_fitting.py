@@ -10,11 +10,12 @@ from workbench.fitting.errors import Place, plain_ratio, signal_errors
 from workbench.fitting.gauss_newton import best_of_each, fit_windows, points_costs
 from workbench.fitting.linearised import Point
 from workbench.fitting.noise import measured_noise
+from workbench.fitting.problem import fuller, staged
 from workbench.fitting.start_states import refit_starts
 from workbench.fitting.starts import guessed_states
 from workbench.fitting.unknowns import Unknowns, nominal_unknowns
 from workbench.fitting.windows import UNSEEN_PENALTY, cut_windows
-from workbench.plants import crr_arm, cylinder_bench, servo_drive
+from workbench.plants import crr_arm, crr_rig, cylinder_bench, servo_drive
 from workbench.recording import Recording
 from workbench.simulation import simulate
 
@@ -195,3 +196,14 @@ def test_an_arm_of_which_the_angle_is_recorded_starts_with_its_gas_and_speed():
     speed = run["joint.velocity_rad_s"]
     error = (guess["joint.velocity_rad_s"] - speed)[10:-10]
     assert np.sqrt(np.mean(error**2)) < 0.1 * np.sqrt(np.mean(speed**2))
+
+
+@pytest.mark.parametrize("build", [crr_rig, servo_drive], ids=["crr_rig", "servo_drive"])
+def test_a_plant_with_more_members_keeps_every_state_of_one_with_fewer(build):
+    # The friction of the rescue robot's rig has no bristle unless one of its causes is added.
+    whole = build()
+    for added in whole.candidates.values():
+        plant = staged(whole, added.member)
+        richer = fuller(whole, plant, "chamber_leak@cap", "valve_lag")
+
+        assert set(plant.state_list) <= set(richer.state_list), added.name

@@ -76,7 +76,9 @@ def consistent_start(plant: Plant, known: Mapping[str, float]) -> np.ndarray:
     """
     model, (u, d, p) = plant.model, plant.nominal
     x = plant.initial
-    chambers = [n.rpartition(".")[0] for n in model.states if n.endswith("." + MASS)]
+    parts = {part.name for part in plant.parts}
+    owners = (name.rpartition(".") for name in model.states)
+    chambers = [owner for owner, _, what in owners if what == MASS and owner in parts]
     temperatures = model.quantities(*(f"{c}.{TEMPERATURE}" for c in chambers))
     before = temperatures(x, u, d, p).full().ravel()
     for i, name in enumerate(model.states):

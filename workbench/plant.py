@@ -23,6 +23,7 @@ class Signal:
     """An input of the plant: a command, or a disturbance such as the supply pressure.
 
     ``levels`` are the only values that a switched input takes, none where it is continuous.
+    ``measured`` among the commands is one that takes the place of what would produce it.
     """
 
     name: str
@@ -30,6 +31,7 @@ class Signal:
     lower: float = -inf
     upper: float = inf
     levels: tuple[float, ...] = ()
+    measured: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,6 +89,14 @@ class Plant:
         effects = tuple(e for e in self.effects if getattr(e, "produces", None) not in names)
         inputs = self.measured_inputs + taken
         return replace(self, measured_inputs=inputs, optional_inputs=kept, effects=effects)
+
+    def with_inputs_commanded(self) -> Plant:
+        """The same plant with its measured inputs behind its commands, as what is fed to it.
+
+        An estimator is told commands alone, sample by sample.
+        """
+        taken = tuple(replace(signal, measured=True) for signal in self.measured_inputs)
+        return replace(self, commands=self.commands + taken, measured_inputs=())
 
     def with_measured(self, *names: str) -> Plant:
         """The same plant with these outputs, in this order."""
@@ -209,15 +219,17 @@ class Plant:
     ) -> Conditions:
         """All quantities at one instant; commands and sources pass the effects that alter them."""
         now = Conditions()
-        for name, symbol in (x | d).items():
+        given = d | {s.name: u[s.name] for s in self.commands if s.measured}
+        for name, symbol in (x | given).items():
             now.place(name, symbol)
         for part in self.parts:
             for quantity, value in part.derive(now).items():
                 name = f"{part.name}.{quantity}"
-                if name not in d:
+                if name not in given:
                     now.place(name, self._altered(name, value, now))
         for name, symbol in u.items():
-            now.place(name, self._altered(name, symbol, now))
+            if name not in given:
+                now.place(name, self._altered(name, symbol, now))
         return now
 
     def _altered(self, signal: str, value: Expression, now: Conditions) -> Expression:

@@ -138,7 +138,7 @@ class PlantFilter:
         coupling = E * np.outer(1 / plant.scale, S[n:])
         F = transition(ca.blockcat([[A, coupling], [ca.MX(n_w, n), ca.MX(n_w, n_w)]]), h)
         Q = ca.MX.sym("Q", n + n_w, n + n_w)
-        step = self._step
+        step = self.step
         for k in range(self.decimate):
             x = step(x, u[:, k], d[:, k], ca.vertcat(p, w))
         later = ca.vertcat(x / plant.scale, X[n:, 0])
@@ -153,6 +153,13 @@ class PlantFilter:
 
         ``received`` is 1 or 0 by output; a missing value of y may hold any finite number.
         """
+        told = self.correct_with_nis
+        symbols = [ca.MX.sym(f"i{i}", *told.size_in(i)) for i in range(told.n_in())]
+        return ca.Function("correct", symbols, told(*symbols)[:-1])
+
+    @cached_property
+    def correct_with_nis(self) -> ca.Function:
+        """:attr:`correct`, and last the innovation squared over its covariance, e' S^-1 e."""
         model, n = self.plant.model, len(self.plant.scale)
         size, n_y = len(self.scale), len(model.measured)
         X, P = ca.MX.sym("X", size), ca.MX.sym("P", size, size)
@@ -168,11 +175,10 @@ class PlantFilter:
         K = self.corrected[:, None] * ca.solve(S, H @ P).T
         rest = ca.MX.eye(size) - K @ H
         weighted = ca.solve(S, ca.horzcat(e, H))
-        likely = -0.5 * (
-            e.T @ ca.solve(S, e) + ca.log(ca.det(S)) + ca.dot(received, np.log(2 * np.pi * r**2))
-        )
+        nis = e.T @ ca.solve(S, e)
+        likely = -0.5 * (nis + ca.log(ca.det(S)) + ca.dot(received, np.log(2 * np.pi * r**2)))
         results = [X + K @ e, rest @ P @ rest.T + K @ K.T, e * r, ca.sqrt(ca.diag(S)) * r, likely]
-        results += [H.T @ weighted[:, 0], H.T @ weighted[:, 1:], rest]
+        results += [H.T @ weighted[:, 0], H.T @ weighted[:, 1:], rest, nis]
         return ca.Function("correct", [X, P, u, d, p, y, received], results)
 
     @cached_property
@@ -252,7 +258,7 @@ class PlantFilter:
         return np.array([*free, *[1.0] * len(self.unknown_inputs)])
 
     @cached_property
-    def _step(self) -> ca.Function:
+    def step(self) -> ca.Function:
         """(x, u, d, (p, w)) -> x one sample later; a state that is lost stays as it is.
 
         The integrator would try the finest of its steps on every sample of it.
@@ -267,14 +273,21 @@ class PlantFilter:
     @cached_property
     def _advance(self) -> ca.Function:
         """(x, u, d, (p, w)) -> x one sample later, machine code where there is a compiler."""
+        if not self.unknown_inputs:
+            return self.plant.model.compiled_step(self.sample_time_s)
+        return compiled(self.advance)
+
+    @cached_property
+    def advance(self) -> ca.Function:
+        """(x, u, d, (p, w)) -> x one sample later, for building."""
         model, dt = self.plant.model, self.sample_time_s
         if not self.unknown_inputs:
-            return model.compiled_step(dt)
+            return model.step(dt)
         x, u, d, p = model.symbols
         w = ca.SX.sym("w", len(self.unknown_inputs))
         rates = ca.substitute(model.rates, p, p + ca.DM(self._wandering) @ w)
         rates += ca.DM(self._entering) @ w
-        return compiled(controlled_step((x, u, d, ca.vertcat(p, w)), rates, dt, model.tolerances))
+        return controlled_step((x, u, d, ca.vertcat(p, w)), rates, dt, model.tolerances)
 
 
 def _slides(member: Effect) -> bool:

@@ -3,7 +3,16 @@
 Whatever takes time to import is imported inside the commands, so that ``--help`` is quick.
 """
 
-from studies.command_line import catalogue, control, identify, missing, plant, show, study
+from studies.command_line import (
+    catalogue,
+    control,
+    estimation,
+    identify,
+    missing,
+    plant,
+    show,
+    study,
+)
 from studies.command_line.application import app
 
 ORDER = [
@@ -21,6 +30,7 @@ ORDER = [
     "modes",
     "design",
     "check",
+    "estimate",
     "study",
     "report",
 ]
@@ -30,6 +40,7 @@ __all__ = [
     "app",
     "catalogue",
     "control",
+    "estimation",
     "identify",
     "main",
     "missing",

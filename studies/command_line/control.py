@@ -140,7 +140,9 @@ def check(
     design: DesignFile,
     estimator: Annotated[
         list[str] | None,
-        typer.Option("--estimator", metavar="NAME", help="ekf (usual) or mhe; not for shifts."),
+        typer.Option(
+            "--estimator", metavar="NAME", help="ekf (usual), ukf, imm, mhe; not for shifts."
+        ),
     ] = None,
     scenario: Annotated[
         list[str] | None,

@@ -7,6 +7,7 @@ import numpy as np
 
 from studies.truth import drive as d
 from studies.truth.batch import stack
+from studies.truth.disturbance import disturbance, disturbed
 from studies.truth.instruments import quantised
 from studies.truth.integrate import advance, bench, observed
 from studies.truth.manoeuvre import START_M, Loop, loop_command, start_loop
@@ -36,8 +37,12 @@ def closed_loop(
     generators: Sequence[np.random.Generator],
     keep_states: Sequence[int] = (),
     start_m: float | np.ndarray = START_M,
+    disturbances: Sequence[np.random.Generator] = (),
 ) -> Run:
-    """Follow references of shape (n_samples, n_columns), after 0.3 s of unrecorded settling."""
+    """Follow references of shape (n_samples, n_columns), after 0.3 s of unrecorded settling.
+
+    With a generator for each column, each is under a process disturbance of its own.
+    """
     prepared = bench(stack(drives))
     lead = np.repeat(references_m[:1], SETTLING_SAMPLES, axis=0)
     reference = np.concatenate([lead, references_m])
@@ -48,6 +53,7 @@ def closed_loop(
     loop = Loop(p.dead_zone_centre_v, 0.95 * p.dead_zone_half_width_v)
     state = d.at_rest(p, np.full(len(drives), start_m), 0.8 * p.supply_pressure_pa)
     memory = start_loop(state.position_m)
+    by = disturbance(len(reference), disturbances) if disturbances else None
     readings, truths, states = [], [], {}
     for k in range(len(reference)):
         seen = observed(p, state)
@@ -58,7 +64,8 @@ def closed_loop(
         truths.append(seen)
         if k - SETTLING_SAMPLES in keep_states:
             states[k - SETTLING_SAMPLES] = state
-        state = advance(prepared, state, reading["command_v"])
+        sent = reading["command_v"]
+        state = disturbed(prepared, state, sent, by, k) if by else advance(prepared, state, sent)
     return Run(_columns(readings), _columns(truths), states)
 
 

@@ -9,7 +9,7 @@ Source: diagnosis.md 1.2 to 1.9.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 from workbench.comparison.regimes import regime_shares
@@ -28,10 +28,10 @@ from workbench.diagnosis.law import empirical_law
 from workbench.diagnosis.next_recording import recommended
 from workbench.diagnosis.pairs import with_pairs
 from workbench.diagnosis.ranking import ranked
-from workbench.diagnosis.refit import Refit, refit, refit_shift
+from workbench.diagnosis.refit import Refit, refit, refit_from, refit_shift
 from workbench.diagnosis.result import NAMING, Diagnosis, Law, Ranked, Where
 from workbench.diagnosis.rough import rough_fit
-from workbench.diagnosis.scan import Profile, scan_catalogue
+from workbench.diagnosis.scan import Profile, scan_catalogue, scan_from_priors
 from workbench.diagnosis.shifts import Shift, shifts
 from workbench.diagnosis.verdict import far_above_noise, judged, sentence, unexplained, unsteady
 from workbench.diagnosis.where import acts_in, locate
@@ -49,6 +49,8 @@ WORTH_A_REFIT = 0.4  # of the best share of the first fits
 SHIFTS_REFITTED = 2  # parameters that leave their priors
 WORTH_A_SHIFT = 0.25  # of the best refit
 LOCATED = 2  # candidates that are followed because they act where the smoother finds a lack
+IMITATED = 2  # candidates that are followed because they lead where no parameter has moved
+LEAVES_MUCH = 0.5  # of the misfit removed: below it, rivals are refitted from the leader's place
 
 Progress = Callable[[str], None]
 
@@ -144,7 +146,7 @@ def _followed(problem: Problem, where: Where | None, progress: Progress) -> _Fol
     """Scan the catalogue and refit the best few."""
     progress("scan of the catalogue")
     profiles = scan_catalogue(problem)
-    looked = _shortlist(profiles, where)
+    looked = _shortlist(profiles, where, scan_from_priors(problem))
     progress(f"first fits of {len(looked)} candidates")
     begun = sorted((rough_fit(problem, p) for p in looked), key=lambda each: -each.share)
     refits: list[Refit] = []
@@ -160,22 +162,55 @@ def _followed(problem: Problem, where: Where | None, progress: Progress) -> _Fol
     for shift in [each for each in moved if each.leaves and each.drop > least][:SHIFTS_REFITTED]:
         progress(f"refit with {shift.name} free")
         refits.append(refit_shift(problem, shift, _best_share(refits)))
-    against = {id(each): reasons_against(problem.base, each) for each in refits}
-    refits.sort(key=lambda r: (bool(against[id(r)]), not predicts(r), -r.drop_train))
+    named = {profile.candidate.name for profile in profiles}
+    refits = _from_the_leader(problem, _best_first(problem, refits), named, progress)
     shares = {each.profile.candidate.name: each.share for each in begun}
     return _Followed(profiles, shares, refits, moved)
 
 
-def _shortlist(profiles: list[Profile], where: Where | None) -> list[Profile]:
-    """The best of the scan, and the best of those that act in the balance that lacks something.
+def _best_first(problem: Problem, refits: Sequence[Refit]) -> list[Refit]:
+    """The accepted ones first, then those that predict, the largest drop first."""
+    against = {id(each): bool(reasons_against(problem.base, each)) for each in refits}
+    return sorted(refits, key=lambda r: (against[id(r)], not predicts(r), -r.drop_train))
 
-    The two fail on different effects (diagnosis.md 4.1).
+
+def _from_the_leader(
+    problem: Problem, refits: list[Refit], named: Collection[str], progress: Progress
+) -> list[Refit]:
+    """Refits whose rivals begin once more where an accepted leader that leaves much ended.
+
+    Fits end in different valleys, and then the leader may lead by its place alone.  ``named`` are
+    the effects: shifts of fitted parameters begin at the base.
+    """
+    leader = refits[0] if refits else None
+    if not leader or leader.candidate.name not in named or leader.drop_train > LEAVES_MUCH:
+        return refits
+    if reasons_against(problem.base, leader):
+        return refits
+    found = [leader]
+    for each in refits[1:]:
+        if each.candidate.name in named:
+            progress(f"refit with {each.candidate.name} from another place")
+            own = {name: size.value for name, size in each.size.items()}
+            again = refit_from(problem, each.candidate, {**leader.fit.plant.values, **own})
+            each = min((each, again), key=lambda fitted: fitted.fit.cost)
+        found.append(each)
+    return _best_first(problem, found)
+
+
+def _shortlist(
+    profiles: list[Profile], where: Where | None, from_priors: list[Profile]
+) -> list[Profile]:
+    """The best of the scan, of those that act in the balance that lacks something, of the priors.
+
+    The first two fail on different effects (diagnosis.md 4.1).  ``from_priors`` sees what the
+    prior fit imitates.
     """
     best = [p for p in profiles[:FITTED_FIRST] if p.drop > WORTH_A_LOOK * profiles[0].drop]
-    if where is None:
-        return best
-    there = [p for p in profiles if p.drop > 0.0 and acts_in(p.candidate, where.balance)]
-    return best + [p for p in there[:LOCATED] if p not in best]
+    there = [p for p in profiles if p.drop > 0.0 and where and acts_in(p.candidate, where.balance)]
+    hidden = [p.candidate for p in from_priors[:IMITATED] if p.drop > 0.0]
+    others = [*there[:LOCATED], *(p for p in profiles if p.candidate in hidden)]
+    return best + [p for k, p in enumerate(others) if p not in best and p not in others[:k]]
 
 
 def _best_share(refits: list[Refit]) -> float:

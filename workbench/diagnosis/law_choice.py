@@ -28,7 +28,7 @@ from workbench.diagnosis.judge import CLOSE_DROP, SAME_DIRECTION
 from workbench.diagnosis.metric import Metric, every_second
 from workbench.diagnosis.scan import Profile
 from workbench.effect import Parameter
-from workbench.fitting.problem import Problem, staged
+from workbench.fitting.problem import Problem, fuller
 from workbench.fitting.start_states import carried
 
 SECANT = 0.3  # of the typical size
@@ -79,8 +79,8 @@ def worth_scanning(
     windows, point, metric, of_all = every_second(at.windows, at.unknowns, at.point, at.derivatives)
     if not terms or blind_starts(windows.plant, metric.at):
         return list(terms), list(terms)
-    there = [effect.name for effect in windows.plant.effects if effect.absent]
-    richer = windows.with_plant(staged(problem.whole, *there, *(c.member for c in terms)))
+    members = (c.member for c in terms)
+    richer = windows.with_plant(fuller(problem.whole, windows.plant, *members))
     starts, values = carried(point.starts, windows, richer), at.unknowns.values(point.t)
     steps = {c.strength: _secant(richer.plant.parameters[c.strength]) for c in terms}
     plants = [richer.plant.with_values({**values, name: h}) for name, h in steps.items()]

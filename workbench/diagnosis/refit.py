@@ -20,7 +20,7 @@ from workbench.fitting.errors import plain_ratio
 from workbench.fitting.gauss_newton import Fit, fit_windows, points_costs
 from workbench.fitting.linearised import Point
 from workbench.fitting.posterior import posterior_deviation
-from workbench.fitting.problem import Problem, misfit
+from workbench.fitting.problem import Problem, beyond_noise, misfit
 from workbench.fitting.start_states import carried
 from workbench.fitting.unknowns import WIDE
 
@@ -150,8 +150,9 @@ def held_out_drop(before: Fit | None, after: Fit | None) -> float:
     """
     if before is None or after is None:
         return float("nan")
-    gained = float(np.sum(_bounded(before)) - np.sum(_bounded(after)))
-    return gained / max(float(np.sum(_bounded(before))) - before.windows.floor, 1.0)
+    squares = float(np.sum(_bounded(before)))
+    gained = squares - float(np.sum(_bounded(after)))
+    return gained / beyond_noise(squares, before.windows)
 
 
 def _bounded(fit: Fit) -> np.ndarray:

@@ -31,7 +31,6 @@ SHARES = (2.0, 1.0, 0.5, 0.0)  # of the linear step of the nuisances that goes w
 ITERATIONS = 4
 KEPT = 0.5  # of what the scan promised: a first fit that keeps less tries a larger size
 WORTH_TRYING = 5.0  # times the cost of the best start
-FAR = 1.5  # prior deviations: where the base has moved a parameter further, fits begin there too
 
 
 @dataclass(frozen=True)
@@ -140,8 +139,6 @@ def _starts(
 
     trials = _distinct(profile.trials, most)
     near = [point(base.point.t + share * t.nuisance, t) for t in trials for share in SHARES]
-    own = np.array([name in {c.strength for c in problem.added} for name in base.unknowns.names])
-    at_priors = np.where(own, base.point.t, 0.0)
-    if not np.any(np.abs(base.point.t - at_priors) > FAR):
+    if not problem.moved_far:
         return [near]
-    return [near, [point(at_priors, trial) for trial in profile.trials]]
+    return [near, [point(problem.at_priors, trial) for trial in profile.trials]]

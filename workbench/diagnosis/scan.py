@@ -31,7 +31,7 @@ from workbench.diagnosis.blind_starts import blind_starts, freed
 from workbench.diagnosis.metric import Metric, every_second
 from workbench.effect import Parameter
 from workbench.fitting.linearised import Linearised, Point
-from workbench.fitting.problem import Problem, staged, stateless
+from workbench.fitting.problem import Problem, fuller, stateless
 from workbench.fitting.start_states import carried
 from workbench.fitting.unknowns import Unknowns
 from workbench.fitting.windows import Windows
@@ -101,11 +101,10 @@ def scan(
     windows, point, metric, of_all = every_second(windows, unknowns, point, at)
     blind = blind_starts(windows.plant, metric.at)
     values = unknowns.values(point.t)
-    kept = [effect.name for effect in windows.plant.effects if effect.absent]
     profiles = []
     known = whole.parameters
     for needed, members in _groups(whole, windows.plant, candidates).items():
-        richer = windows.with_plant(staged(whole, *kept, *needed)) if needed else windows
+        richer = windows.with_plant(fuller(whole, windows.plant, *needed)) if needed else windows
         starts = carried(point.starts, windows, richer)
         trials = [
             (candidate, change)
@@ -127,9 +126,28 @@ def scan(
 def scan_catalogue(problem: Problem) -> list[Profile]:
     """Profiles of the causes that are not there and not shifts of fitted parameters."""
     base = problem.base
+    absent, at = _absent(problem), problem.linearised
+    return scan(problem.whole, base.windows, base.unknowns, base.point, absent, at)
+
+
+def scan_from_priors(problem: Problem) -> list[Profile]:
+    """The same where no parameter has moved yet; nothing where the prior fit moved none far.
+
+    Parameters that imitate an effect hide it from a scan at the prior fit: what an underlap lets
+    through, a leak and another heat flow together do too, several deviations off their priors.
+    """
+    if not problem.moved_far:
+        return []
+    base = problem.base
+    point = Point(problem.at_priors, base.point.starts)
+    return scan(problem.whole, base.windows, base.unknowns, point, _absent(problem))
+
+
+def _absent(problem: Problem) -> list[Candidate]:
+    base = problem.base
     values = base.plant.values
     known = problem.whole.parameters
-    absent = [
+    return [
         c
         for c in problem.whole.candidates.values()
         if c.held is None and c.strength not in problem.rig.fixed
@@ -137,8 +155,6 @@ def scan_catalogue(problem: Problem) -> list[Profile]:
         and (c.cause.tolerated or values.get(c.strength, known[c.strength].null)
              == known[c.strength].null)
     ]  # fmt: skip
-    at = problem.linearised
-    return scan(problem.whole, base.windows, base.unknowns, base.point, absent, at)
 
 
 def sizes_to_try(plant: Plant, candidate: Candidate) -> list[dict[str, float]]:

@@ -14,7 +14,7 @@ Source: diagnosis.md 1.3; Kristensen, Madsen and Jorgensen 2004 (significant dif
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -66,8 +66,8 @@ def locate(problem: Problem, recordings: Sequence[Recording]) -> Where | None:
     if not gains:
         return None
     worst = _worst(gains)
-    likeliest = gains[worst][1]
-    neighbour = _neighbour(worst, likeliest)
+    likeliest = max(gains[worst], key=lambda q: gains[worst][q])
+    neighbour = _neighbour(gains[worst], likeliest)
     filters = lacking({worst.parameter: likeliest})
     result, other = (smooth(filters, recording, q / likeliest) for q in (likeliest, neighbour))
     term, course = result.unknown[0], _course(plant, recording, result, decimate, worst)
@@ -76,7 +76,7 @@ def locate(problem: Problem, recordings: Sequence[Recording]) -> Where | None:
     drivers = _drivers(plant, result, course.commands)
     return Where(
         balance=worst.balance,
-        by_balance={s.balance: gain for s, (gain, _) in gains.items()},
+        by_balance={s.balance: max(by.values()) for s, by in gains.items()},
         term_name=worst.term,
         time_s=result.time_s,
         term=term,
@@ -90,10 +90,10 @@ def locate(problem: Problem, recordings: Sequence[Recording]) -> Where | None:
     )
 
 
-def _neighbour(suspect: Suspect, likeliest: float) -> float:
-    """The next lower intensity that was tried; of the lowest the next higher one."""
-    tried = sorted(suspect.intensities)
-    return tried[abs(tried.index(likeliest) - 1)]
+def _neighbour(tried: Iterable[float], likeliest: float) -> float:
+    """The next lower intensity that was followed; of the lowest the next higher one, if any."""
+    tried = sorted(tried)
+    return tried[min(abs(tried.index(likeliest) - 1), len(tried) - 1)]
 
 
 def _grid_s(plant: Plant, recording: Recording) -> float:
@@ -102,9 +102,9 @@ def _grid_s(plant: Plant, recording: Recording) -> float:
     return GRID_S if moves(plant) else max(GRID_S, length_s / LONGEST)
 
 
-def _worst(gains: Mapping[Suspect, tuple[float, float]]) -> Suspect:
+def _worst(gains: Mapping[Suspect, Mapping[float, float]]) -> Suspect:
     """The balance that gains most; heat only where it gains clearly more than the gas."""
-    named = {suspect.balance: gain for suspect, (gain, _) in gains.items()}
+    named = {suspect.balance: max(by.values()) for suspect, by in gains.items()}
     heat, gas = f".{Balance.ENERGY.value}", f".{Balance.MASS.value}"
 
     def counted(suspect: Suspect) -> float:
@@ -132,16 +132,19 @@ def _gains(
     suspected: list[Suspect],
     lacking: Callable[[dict[str, float]], PlantFilter],
     recording: Recording,
-) -> dict[Suspect, tuple[float, float]]:
-    """Log-likelihood that each suspect gains over a model without it, and at which intensity."""
+) -> dict[Suspect, dict[float, float]]:
+    """Log-likelihood that each suspect gains over a model without it, by intensity.
+
+    An intensity whose run was lost is left out.
+    """
     trials = [(s, q) for s in suspected for q in s.intensities]
     known = lacking({s.parameter: s.intensities[0] for s in suspected})
     factors = [[q / each.intensities[0] * (s is each) for s, q in trials] for each in suspected]
     plain, *likely = log_likelihoods(known, recording, np.pad(factors, ((0, 0), (1, 0))))
-    gains: dict[Suspect, tuple[float, float]] = {}
+    gains: dict[Suspect, dict[float, float]] = {}
     for (suspect, q), gain in zip(trials, likely - plain, strict=True):
-        if np.isfinite(gain) and gain > gains.get(suspect, (-np.inf, q))[0]:
-            gains[suspect] = float(gain), q
+        if np.isfinite(gain):
+            gains.setdefault(suspect, {})[q] = float(gain)
     return gains
 
 

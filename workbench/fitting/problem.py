@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from workbench.candidate import Candidate
 from workbench.effect import Effect
 from workbench.fitting.gauss_newton import Fit, fit_windows, points_costs
@@ -13,7 +15,7 @@ from workbench.fitting.noise import measured_noise
 from workbench.fitting.start_states import refit_starts
 from workbench.fitting.unknowns import Unknowns, nominal_unknowns
 from workbench.fitting.window_length import window_length_s
-from workbench.fitting.windows import MOST_WINDOWS, cut_windows, one_clock
+from workbench.fitting.windows import MOST_WINDOWS, Windows, cut_windows, one_clock
 from workbench.plant import Plant
 from workbench.recording import Recording, same_data
 from workbench.rig import Rig
@@ -22,6 +24,8 @@ FIRST_ITERATIONS = 3  # with scales from the model as it came
 ITERATIONS = 12  # with scales from the first fit
 LEAST_HELD_OUT_WINDOWS = 24
 NO_EVIDENCE = "a validation recording is one of the training recordings, which proves nothing"
+FAR = 1.5  # prior deviations: beyond, a parameter may imitate what is missing
+NOISE_KNOWN_TO = 0.05  # of its square
 LEAST_IMPROVEMENT = 0.03  # of the misfit, for a prior fit to be taken up again
 
 
@@ -62,6 +66,18 @@ class Problem:
         return refit_starts(windows, fit.plant.values, self.base_validation)
 
     @property
+    def at_priors(self) -> np.ndarray:
+        """The scaled unknowns of the base at their priors; what the rig added keeps its size."""
+        own = {candidate.strength for candidate in self.added}
+        mine = [name in own for name in self.base.unknowns.names]
+        return np.where(mine, self.base.point.t, 0.0)
+
+    @property
+    def moved_far(self) -> bool:
+        """True where the prior fit has moved a parameter so far that it may imitate an effect."""
+        return bool(np.any(np.abs(self.base.point.t - self.at_priors) > FAR))
+
+    @property
     def linearised(self) -> Linearised:
         """Residuals and derivatives at the base, for scan, shifts and refits."""
         return self.base.derivatives
@@ -78,7 +94,16 @@ def misfit(fit: Fit) -> float:
     The price counts: a fit that reaches the same error with a heat flow five deviations off its
     prior has explained less than one that stays near it.
     """
-    return max(fit.cost - fit.windows.floor, 1.0)
+    return beyond_noise(fit.cost, fit.windows)
+
+
+def beyond_noise(squares: float, windows: Windows) -> float:
+    """What a sum of squared weighted residuals holds beyond sensor noise, at least 1.
+
+    Noise is measured in still pieces and known to a few percent only: what is left above it counts
+    as no less than that, or a share of next to nothing would speak for an effect.
+    """
+    return max(squares - windows.floor, NOISE_KNOWN_TO * windows.floor, 1.0)
 
 
 def staged(whole: Plant, *members: str) -> Plant:
@@ -90,6 +115,16 @@ def staged(whole: Plant, *members: str) -> Plant:
     return whole.lean(keep=[*tolerated, *members])
 
 
+def fuller(whole: Plant, plant: Plant, *members: str) -> Plant:
+    """The whole plant staged for the named members and for all that another one of it holds.
+
+    That one may hold what is absent, and in full what could be reduced: the friction of which an
+    added cause is one keeps its bristle, whose state has to be there again.
+    """
+    held = [e.name for e in plant.effects if e.absent or e.reduced() is not e]
+    return staged(whole, *held, *members)
+
+
 def stateless(plant: Plant) -> list[Effect]:
     """The effects of a plant that bring no states."""
     return [effect for effect in plant.effects if not tuple(effect.states())]
@@ -99,7 +134,8 @@ def improved_base(problem: Problem, fits: Sequence[Fit]) -> Problem | None:
     """The problem with a better prior fit, where the refits found its parameters; else None.
 
     A refit whose nominal parameters alone, with its effect taken away again, are better than the
-    base has found a place that the prior fit missed; its effect would get the credit for that.
+    base, or soon lead to better ones, has found a place that the prior fit missed; its effect would
+    get the credit for that.
     """
     base = problem.base
     points = []
@@ -109,9 +145,15 @@ def improved_base(problem: Problem, fits: Sequence[Fit]) -> Problem | None:
         rows = [states.index(name) for name in base.windows.plant.state_list]
         t = base.unknowns.clipped(base.unknowns.scaled(values))
         points.append(Point(t, fit.point.starts[rows]))
-    best = points_costs(base.windows, base.unknowns, points).best if points else None
-    if not best or base.cost - best.cost < LEAST_IMPROVEMENT * problem.misfit:
+    if not points:
         return None
+    best = points_costs(base.windows, base.unknowns, points).best
+    least = base.cost - LEAST_IMPROVEMENT * problem.misfit
+    if best.cost > least:
+        tried = fit_windows(base.windows, base.unknowns, best, FIRST_ITERATIONS)
+        if tried.cost > least:
+            return None
+        best = tried.point
     better = fit_windows(base.windows, base.unknowns, best, ITERATIONS)
     held_out = problem.base_validation
     if held_out:

@@ -1,0 +1,63 @@
+"""An outlier gate before any estimator: a measurement that cannot be is taken as not received.
+
+An output is left out where it lies further from what is foreseen than so many standard deviations
+of its innovation.  A sensor that has come back after a jump must be believed again, so that not
+more than ``patience`` samples in a row are left out.
+
+Source: Bar-Shalom, Li and Kirubarajan 2001, "Estimation with applications to tracking and
+navigation", Sec. 1.5 (validation gate), output by output.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from estimators.foreseen import Foresight
+from workbench.contracts import Estimate
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gated:
+    """Any estimator behind a gate; the note ``outliers`` counts what was left out of a sample."""
+
+    inner: Any
+    deviations: float = 5.0
+    patience: int = 20
+
+    @property
+    def sample_time_s(self) -> float:
+        return self.inner.sample_time_s
+
+    @property
+    def plant(self) -> Any:
+        """The plant of the estimator."""
+        return self.inner.plant
+
+    @property
+    def measurement_noise(self) -> Any:
+        """That of the estimator."""
+        return self.inner.measurement_noise
+
+    def start(self, measurement: np.ndarray) -> Estimate:
+        begun = self.inner.start(measurement)
+        return replace(begun, memory=(begun, np.zeros(len(measurement), dtype=int)))
+
+    def update(self, last: Estimate, command: np.ndarray, measurement: np.ndarray) -> Estimate:
+        before, in_a_row = last.memory
+        y, S = self._sight.outputs(self._sight.blind(before, command), command)
+        with np.errstate(invalid="ignore"):
+            far = np.abs(measurement - y) > self.deviations * np.sqrt(np.diag(S))
+        out = far & (in_a_row < self.patience)
+        now = self.inner.update(before, command, np.where(out, np.nan, measurement))
+        seen = np.isfinite(measurement)
+        in_a_row = np.where(out, in_a_row + 1, np.where(seen, 0, in_a_row))
+        notes = {**now.notes, "outliers": float(out.sum())}
+        return replace(now, memory=(now, in_a_row), notes=notes)
+
+    @cached_property
+    def _sight(self) -> Foresight:
+        return Foresight(self.inner)

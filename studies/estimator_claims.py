@@ -1,0 +1,140 @@
+"""What the study of estimators claims, and its tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from studies.estimator_runs import band
+from studies.study import Claim
+from studies.text import columns, number, percent
+
+ALL = ("kalman", "ekf", "ukf", "imm", "mhe")
+HALF, NEAR_PA = 0.5, 0.15e5
+NAMED = 0.95
+DEGREES = 4  # position, velocity, two pressures
+OUTPUTS = 3
+Rows = Sequence[Mapping[str, Any]]
+
+
+def courses(rows: Sequence[Mapping[str, Any]]) -> tuple[np.ndarray, np.ndarray]:
+    """Mean over the runs that move at a sample, NaN where fewer than half do, and how many."""
+    values, moving = (np.array([row[key] for row in rows]) for key in ("nees", "moving"))
+    there = moving.sum(axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean = np.where(there >= len(rows) / 2, (values * moving).sum(axis=0) / there, np.nan)
+    return mean, there
+
+
+def summary(rows: Sequence[Mapping[str, Any]]) -> dict[str, float]:
+    """Means over moving samples of all runs, and the share of samples inside their own band."""
+    values, nis, moving = (
+        np.array([row[key] for row in rows], dtype=float) for key in ("nees", "nis", "moving")
+    )
+    mean, there = courses(rows)
+    judged = [(m, *band(DEGREES, n)) for m, n in zip(mean, there, strict=True) if np.isfinite(m)]
+    inside = [low <= m <= high for m, low, high in judged]
+    low, high = band(DEGREES, len(rows))
+    return {
+        "nees": float(values[moving > 0].mean()),
+        "low": low,
+        "high": high,
+        "inside": float(np.mean(inside)) if inside else float("nan"),
+        "nis": float(nis[moving > 0].mean()),
+        "runs": len(rows),
+    }
+
+
+def velocity_claims(found: Mapping[str, Mapping[str, float]]) -> Iterator[Claim]:
+    for plant, rows in found.items():
+        told = ", ".join(f"{name} {number(rows[name] / rows['derivative'], 3)}" for name in ALL)
+        yield Claim(
+            f"{plant}: the EKF's velocity error is below half of the filtered derivative's",
+            told,
+            rows["ekf"] < HALF * rows["derivative"],
+        )
+
+
+def position_claims(
+    seen: Mapping[str, Any], alone: Sequence[Mapping[str, float]]
+) -> Iterator[Claim]:
+    worst = max(max(row["a"], row["b"]) for row in alone)
+    yield Claim(
+        "servo_drive, position alone: pressures in motion within 0.15 bar",
+        f"{1e-5 * worst:.3f} bar RMS in the worst of {len(alone)} runs",
+        worst < NEAR_PA,
+    )
+    yield Claim(
+        "servo_drive, position alone: all modes that slide are observable",
+        f"{seen['whole']} of {seen['modes']} modes; not: sticking",
+        all("stick" in name for name in seen["not"]),
+    )
+
+
+def consistency_claims(found: Mapping[str, Sequence[Mapping[str, Any]]]) -> Iterator[Claim]:
+    for name, rows in found.items():
+        s = summary(rows)
+        yield Claim(
+            f"{name}: NEES over {s['runs']} runs inside its 95 % band",
+            f"{s['nees']:.2f} of {s['low']:.2f} to {s['high']:.2f}",
+            s["low"] <= s["nees"] <= s["high"],
+        )
+
+
+def mode_claims(found: Mapping[str, Mapping[str, float]]) -> Iterator[Claim]:
+    for what, row in found.items():
+        yield Claim(
+            f"IMM names {what} in 95 % of samples", percent(row["share"], 1), row["share"] >= NAMED
+        )
+
+
+def velocity_text(found: Mapping[str, Mapping[str, float]]) -> str:
+    head = ("velocity RMSE m/s, drawn truth", "derivative", *ALL)
+    lines = [
+        (plant, *(number(rows[name], 3) for name in ("derivative", *ALL)))
+        for plant, rows in found.items()
+    ]
+    return f"{columns(head, lines)}\nthe derivative has the lag that is best for it; - lost"
+
+
+def consistency_text(
+    found: Mapping[str, Mapping[str, Rows]], coloured: Mapping[str, Mapping[str, float]]
+) -> str:
+    """NEES and NIS with their bands, and whiteness, by truth and estimator."""
+    head = ("truth", "estimator", "runs", "NEES", "band", "samples inside", "NIS", "band",
+            "coloured lags")  # fmt: skip
+    lines = []
+    for kind, rows in found.items():
+        for name, several in rows.items():
+            s = summary(several)
+            low, high = band(OUTPUTS, len(several))
+            lines.append(
+                (kind, name, str(s["runs"]), number(s["nees"], 3),
+                 f"{s['low']:.2f} to {s['high']:.2f}", percent(s["inside"]),
+                 number(s["nis"], 3), f"{low:.2f} to {high:.2f}", percent(coloured[kind][name]))
+            )  # fmt: skip
+    return (
+        f"{columns(head, lines)}\nposition, velocity and pressures in motion, on average over "
+        "runs; drawn parameters are not judged; 5 % of the lags are coloured if innovations are "
+        "white"
+    )
+
+
+def position_text(seen: Mapping[str, Any], alone: Sequence[Mapping[str, float]]) -> str:
+    lines = [
+        (str(k), number(1e-5 * row["a"], 3), number(1e-5 * row["b"], 3))
+        for k, row in enumerate(alone)
+    ]
+    told = f"the position alone sees the whole state in {seen['whole']} of {seen['modes']} modes"
+    return f"{told}\n{columns(('run', 'pressure a RMSE bar', 'pressure b RMSE bar'), lines)}"
+
+
+def modes_text(found: Mapping[str, Mapping[str, float]]) -> str:
+    head = ("IMM names", "right", "counted", "phases")
+    lines = [
+        (what, percent(r["share"], 1), percent(r["counted"]), f"{r['phases']:.0f}")
+        for what, r in found.items()
+    ]
+    return f"{columns(head, lines)}\nwithout the first 10 ms of each phase"

@@ -1,0 +1,133 @@
+"""Estimators side by side as text and as JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from studies.text import columns, number, percent, shown
+from workbench.units import public_name, si_unit
+
+if TYPE_CHECKING:
+    from studies.estimating import Estimated, EstimatedRecording
+
+DEFINED = (
+    "nis: innovation squared over its covariance per output, 1 if consistent; coloured: lags at "
+    "which innovations are correlated, 5 % if white"
+)
+
+
+def estimates_text(found: Iterable[EstimatedRecording]) -> str:
+    """Tables of each recording: prediction, states where the truth is known, holes."""
+    return "\n\n".join(_recording_text(each) for each in found)
+
+
+def _recording_text(each: EstimatedRecording) -> str:
+    noise = ", ".join(
+        f"{public_name(name)} {shown(value, name, 3)}" for name, value in each.noise.items()
+    )
+    tuned = ", ".join(f"{group} x {factor:.3g}" for group, factor in each.tuned.factors.items())
+    gain = each.tuned.log_likelihood - each.tuned.before
+    return "\n".join(
+        (
+            f"{each.name}: {len(each.truth) * each.sample_time_s:.4g} s",
+            f"sensor noise: {noise}",
+            f"process noise by likelihood: {tuned} (log-likelihood + {gain:.4g})",
+            "",
+            "on the recording: RMS error of what is foretold from an estimate",
+            _predictions(each),
+            DEFINED,
+            "",
+            f"on the rig's plant under the recorded inputs: RMS error by state, with "
+            f"{each.hidden} hidden, and of outputs after 50 ms without any",
+            _states(each),
+            *(f"{name}: {why}" for name, why in each.lost.items()),
+        )
+    )
+
+
+def _predictions(each: EstimatedRecording) -> str:
+    horizons = [*each.rows[0].horizons]
+    head = ["estimator", "output", *(f"{1e3 * h:g} ms" for h in horizons)]
+    head += ["nis", "coloured", "median us", "p99 us"]
+    lines = [
+        [
+            row.name,
+            public_name(name),
+            *(shown(row.horizons[h][k], name, 3) for h in horizons),
+            number(row.nis, 3),
+            percent(row.coloured[k]),
+            number(1e6 * row.median_s, 3),
+            number(1e6 * row.p99_s, 3),
+        ]
+        for row in each.rows
+        for k, name in enumerate(each.outputs)
+    ]
+    return columns(head, lines)
+
+
+def _states(each: EstimatedRecording) -> str:
+    names = list(dict.fromkeys(name for row in each.rows for name in row.state_rmse))
+    head = ["state", *(f"{row.name}{what}" for row in each.rows for what in ("", " hidden"))]
+    lines = [[public_name(name), *_of_state(each, name)] for name in names]
+    for k, name in enumerate(each.outputs):
+        after = (pair for row in each.rows for pair in (shown(row.gap_rmse[k], name, 3), "-"))
+        lines.append([f"{public_name(name)} after a hole", *after])
+    return columns(head, lines)
+
+
+def _of_state(each: EstimatedRecording, name: str) -> list[str]:
+    pairs = ((row.state_rmse, row.hidden_rmse) for row in each.rows)
+    return [shown(found.get(name, np.nan), name, 3) for pair in pairs for found in pair]
+
+
+def estimates_document(rig: str, found: Iterable[EstimatedRecording]) -> dict[str, Any]:
+    """The same numbers in SI for JSON; what is no number is null."""
+    return {
+        "schema": "workbench.estimates/1",
+        "rig": rig,
+        "recordings": [_recording_document(each) for each in found],
+    }
+
+
+def _recording_document(each: EstimatedRecording) -> dict[str, Any]:
+    return {
+        "recording": each.name,
+        "sample_time_s": each.sample_time_s,
+        "noise": {public_name(n): _value(v, n) for n, v in each.noise.items()},
+        "process_noise_factors": dict(each.tuned.factors),
+        "hidden": each.hidden,
+        "lost": dict(each.lost),
+        "estimators": [_row_document(each, row) for row in each.rows],
+    }
+
+
+def _row_document(each: EstimatedRecording, row: Estimated) -> dict[str, Any]:
+    outputs = each.outputs
+    return {
+        "estimator": row.name,
+        "prediction_rmse": {
+            f"{horizon:g} s": {
+                public_name(n): _value(v, n) for n, v in zip(outputs, errors, strict=True)
+            }
+            for horizon, errors in row.horizons.items()
+        },
+        "nis": _plain(row.nis),
+        "coloured": {public_name(n): _plain(v) for n, v in zip(outputs, row.coloured, strict=True)},
+        "latency_s": {"median": row.median_s, "p99": row.p99_s},
+        "state_rmse": {public_name(n): _value(v, n) for n, v in row.state_rmse.items()},
+        "state_rmse_hidden": {public_name(n): _value(v, n) for n, v in row.hidden_rmse.items()},
+        "after_hole_rmse": {
+            public_name(n): _value(v, n) for n, v in zip(outputs, row.gap_rmse, strict=True)
+        },
+    }
+
+
+def _value(value: float, name: str) -> dict[str, Any]:
+    return {"value": _plain(value), "unit": si_unit(name)}
+
+
+def _plain(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
