@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -19,21 +18,12 @@ from linearize.modes import Mode
 from linearize.standard import PRESSURES, SUPPLY, VELOCITY
 from workbench.plant import Plant
 
-if TYPE_CHECKING:
-    import osqp
-
 LIMITED = (0, 2, 3)  # position and pressures, of STATES
 SLACK_UNIT = np.array([1e-3, 1e4, 1e4])  # m, Pa, Pa: violations that cost alike
 LONGEST = 500  # samples ahead; the program is dense, and grows with the square
-SETTINGS = {
-    "rho": 0.1,
-    "eps_abs": 1e-5,
-    "eps_rel": 1e-5,
-    "polishing": True,
-    "warm_starting": True,
-    "max_iter": 2000,
-    "verbose": False,
-}
+OPTIMAL = 1  # DAQP's flag
+FAR = 1e30  # as good as no bound
+FEASIBLE = 1e-5  # V, or units of the slack
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -144,37 +134,50 @@ class Program:
         D = pull @ self.free + integral * error
         return Law(np.array([[1.0, 0.0], C]), np.array([error, D]), C, D)
 
-    def solver(self, g: np.ndarray, low: np.ndarray, high: np.ndarray) -> osqp.OSQP:
-        """OSQP with this gradient and these sides, still to be started.
+    def solved(
+        self, g: np.ndarray, low: np.ndarray, high: np.ndarray, start: np.ndarray | None
+    ) -> tuple[np.ndarray, int] | None:
+        """The optimum z and DAQP's iterations, from a start where there is one; None without one.
 
-        It adapts its step length while it solves, so that is set back: the same program from the
-        same start has the same solution to the last bit, whatever was solved before.
+        Its word is checked: z is finite and keeps the sides of all rows.
         """
-        self._kept.update(q=g, l=low, u=high)
-        self._kept.update_settings(rho=SETTINGS["rho"])
-        return self._kept
+        import daqp
+
+        if not np.isfinite(g).all():
+            return None
+        first, rest = self._order
+        lower, upper = (np.nan_to_num(side, posinf=FAR, neginf=-FAR) for side in (low, high))
+        z, _, flag, info = daqp.solve(
+            self.H,
+            g,
+            self._general,
+            np.concatenate([upper[first], upper[rest]]),
+            np.concatenate([lower[first], lower[rest]]),
+            np.zeros(len(low), dtype=np.int32),
+            primal_start=start,
+        )
+        if flag != OPTIMAL or not np.isfinite(z).all():
+            return None
+        at = self.rows @ z
+        kept = (at >= low - FEASIBLE).all() and (at <= high + FEASIBLE).all()
+        return (z, int(info["iterations"])) if kept else None
 
     @cached_property
-    def _kept(self) -> osqp.OSQP:
-        """One solver for all samples, for one thread; to set it up takes longer than to solve.
+    def _order(self) -> tuple[np.ndarray, np.ndarray]:
+        """Rows that bound one variable each, in the order of z, and all others."""
+        n, slacks = self.horizon, len(LIMITED)
+        every = np.arange(len(self.rows))
+        return np.concatenate([every[:n], every[-slacks:]]), every[n:-slacks]
 
-        It is set up without gradient and sides: its scaling is found there, once and for all.
-        """
-        import osqp
-
-        solver, none = osqp.OSQP(), np.full(len(self.rows), np.inf)
-        H, rows = sp.csc_matrix(np.triu(self.H)), sp.csc_matrix(self.rows)
-        solver.setup(H, np.zeros(len(self.H)), rows, -none, none, **SETTINGS)
-        return solver
+    @cached_property
+    def _general(self) -> np.ndarray:
+        """The rows that are no bounds of a variable, as DAQP reads them."""
+        return np.ascontiguousarray(self.rows[self._order[1]])
 
     def prepared(self) -> Program:
-        """The same program with its solver set up, so that the first sample need not wait."""
-        _ = self._kept, self.inverse
+        """The same program with its factors at hand, so that the first sample need not wait."""
+        _ = self._order, self._general, self.inverse
         return self
-
-    def __getstate__(self) -> dict[str, Any]:
-        """All but the solver, which another process sets up again."""
-        return {key: value for key, value in self.__dict__.items() if key != "_kept"}
 
 
 def program_of(

@@ -18,7 +18,6 @@ import numpy as np
 from controllers import CONTROLLERS
 from controllers.spec import replaced
 from linearize.modes import HybridModel
-from linearize.standard import slide_modes
 from workbench.contracts import Controller
 from workbench.errors import Message, UnknownNameError, listed, nearest, whole_file
 from workbench.plant import Plant
@@ -49,7 +48,7 @@ def design(method: str, plant: Plant, numbers: Mapping[str, Any] | None = None) 
     Raises
     ------
     UnknownNameError
-        If there is no such method.
+        If there is no such method, or it is not for this plant.
     InputError
         If a number is unknown or makes no sense.
     """
@@ -58,7 +57,7 @@ def design(method: str, plant: Plant, numbers: Mapping[str, Any] | None = None) 
         raise UnknownNameError(Message(what, nearest=nearest(method, CONTROLLERS)))
     found = CONTROLLERS[method]
     spec = replaced(found.spec(), numbers or {}, method)
-    hybrid = slide_modes(plant)
+    hybrid = found.modes(plant)
     return Design(method, plant, spec, hybrid, found.design(hybrid, spec))
 
 

@@ -72,8 +72,12 @@ def _servo_reservoir(plant: Plant) -> HybridModel:
 SLIDE_MODES: dict[str, Callable[[Plant], HybridModel]] = {"servo_drive": _servo_drive}
 """Plants with a slide behind a proportional valve, which the controllers are designed on."""
 
-STANDARD_MODES: dict[str, Callable[[Plant], HybridModel]] = SLIDE_MODES | {
-    "gearbox": gearbox_modes,
+SHIFT_MODES: dict[str, Callable[[Plant], HybridModel]] = {"gearbox": gearbox_modes}
+"""Plants that switching valves shift from one dedicated position to another."""
+
+STANDARD_MODES: dict[str, Callable[[Plant], HybridModel]] = {
+    **SLIDE_MODES,
+    **SHIFT_MODES,
     "crr_rig": _crr_rig,
     "crr_arm": _crr_arm,
     "crr_leg": _crr_leg,
@@ -120,6 +124,17 @@ def slide_modes(plant: Plant) -> HybridModel:
         If it has no such slide.
     """
     return _among(SLIDE_MODES, plant, "no modes to position a slide with for")
+
+
+def shift_modes(plant: Plant) -> HybridModel:
+    """The standard modes of a plant that switching valves shift.
+
+    Raises
+    ------
+    UnknownNameError
+        If it has no such valves.
+    """
+    return _among(SHIFT_MODES, plant, "no modes to shift gears with for")
 
 
 def _among(

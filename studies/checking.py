@@ -12,11 +12,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from controllers.design_file import read_design
-from linearize.standard import SLIDE_MODES
+from linearize.standard import SHIFT_MODES, SLIDE_MODES
 from studies.closed_loop_check import Check, check
 from studies.closed_loop_figures import check_figures
+from studies.figures.shifts import shift_figures
 from studies.figures.style import styled
 from studies.scenarios import SCENARIOS
+from studies.shift_check import SHIFTS, ShiftCheck, check_shifts
 from studies.text import shown
 from workbench.contracts import Controller
 from workbench.errors import InputError, Message, listed
@@ -65,11 +67,45 @@ def check_rig(
     return Check(tuple(rows), tuple(records))
 
 
+def shifts_gears(rig: Rig) -> bool:
+    """True for a plant that shifts between dedicated positions, which is checked in shifts."""
+    return rig.plant.name in SHIFT_MODES
+
+
+def check_gears(
+    rig: Rig,
+    designs: Iterable[Path],
+    scenarios: Iterable[str] = (),
+    runs: int = 1,
+    progress: Callable[[str], None] = lambda message: None,
+) -> ShiftCheck:
+    """As :func:`check_rig` for an actuator that shifts; its estimator is the shift filter.
+
+    Raises
+    ------
+    InputError
+        If a shift does not exist, or a design is for another plant.
+    """
+    names = tuple(scenarios) or tuple(SHIFTS)
+    require(names, SHIFTS, "the list of shifts")
+    controllers = _controllers(rig, designs)
+    rows, records, rng = [], [], np.random.default_rng(0)
+    for number in range(runs):
+        progress(f"shifts, run {number + 1} of {runs}")
+        plant = drawn(rig, rng) if number else rig.plant
+        found = check_shifts(plant, controllers, names, believed=rig.plant, seed=number)
+        mark = f" {number + 1}" if runs > 1 else ""
+        rows += [replace(row, design=row.design + mark) for row in found.rows]
+        records += found.records
+    return ShiftCheck(tuple(rows), tuple(records))
+
+
 def _controllers(rig: Rig, designs: Iterable[Path]) -> dict[str, Controller]:
     """The controllers of design files by the file's name; warns where they are for other values."""
     name = rig.plant.name
-    if name not in SLIDE_MODES:
-        expected = f"a rig of {listed(SLIDE_MODES)}"
+    known = (*SLIDE_MODES, *SHIFT_MODES)
+    if name not in known:
+        expected = f"a rig of {listed(known)}"
         raise InputError(Message(f"{name} has no standard modes to control", rig.name, expected))
     read = {path: read_design(path) for path in designs}
     wrong = [
@@ -111,7 +147,7 @@ def drawn(rig: Rig, rng: np.random.Generator) -> Plant:
     return plant.with_values(values)
 
 
-def styled_figures(found: Check) -> dict[str, Figure]:
+def styled_figures(found: Check | ShiftCheck) -> dict[str, Figure]:
     """The figures of a check in the common style."""
     with styled():
-        return check_figures(found)
+        return shift_figures(found) if isinstance(found, ShiftCheck) else check_figures(found)

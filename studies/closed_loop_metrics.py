@@ -124,7 +124,7 @@ def _step_metrics(position: np.ndarray, wanted: np.ndarray, scenario: Scenario) 
     }
 
 
-def air_used_kg(plant: Plant, record: LoopRecord) -> float:
+def air_used_kg(plant: Plant, record: LoopRecord, sample_time_s: float = SAMPLE_TIME_S) -> float:
     """Air taken from the supply: the flows that leave its balance, summed over the run."""
     import casadi as ca
 
@@ -134,7 +134,7 @@ def air_used_kg(plant: Plant, record: LoopRecord) -> float:
     )
     taken = ca.Function("taken", [*model.symbols], [-leaving])
     u, x = record.recording.rows(model.commands), record.recording.rows(model.states)
-    return float(taken.map(x.shape[1])(x, u, d, p).full().sum() * SAMPLE_TIME_S)
+    return float(taken.map(x.shape[1])(x, u, d, p).full().sum() * sample_time_s)
 
 
 def _violation_s(plant: Plant, record: LoopRecord) -> float:

@@ -10,6 +10,7 @@ from studies.text import columns, number
 
 if TYPE_CHECKING:
     from controllers.certificate import Certificate
+    from controllers.hybrid_mpc import HybridMpc
     from controllers.margins import Margins
 
 HEAD = (
@@ -60,6 +61,20 @@ def certificate_text(found: Certificate) -> str:
         return f"{text}; no dwell time was found either: no certificate across modes"
     dwell = f"certified is a dwell time of {number(1e3 * found.dwell_s, 3)} ms in each mode"
     return f"{text}; {dwell}, each with its own gains, {SCOPE}"
+
+
+def search_text(made: HybridMpc) -> str:
+    """What a hybrid MPC searches, and where each pair of held commands leads."""
+    spec, pairs = made.spec, len(made.plans(0).switches) ** 2
+    held = number(1e3 * spec.hold_s, 3)
+    lines = [f"of {pairs} pairs of plans over {spec.horizon} samples, {held} ms between switches:"]
+    lines.append(
+        f"ranked on affine modes at each sample; the best {spec.judged} judged as they are"
+    )
+    for place_m, commands in made.drives.items():
+        sent = ", ".join(f"{c:g}" for c in commands)
+        lines.append(f"commands {sent} lead to {number(1e3 * place_m, 3)} mm")
+    return "\n".join(lines)
 
 
 def _breaking(pairs: tuple[tuple[str, str], ...]) -> str:

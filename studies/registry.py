@@ -5,6 +5,7 @@ from __future__ import annotations
 from studies import (
     controllers_study,
     estimators_study,
+    gear_shift_study,
     hidden_study,
     identification_study,
     mode_placement,
@@ -17,6 +18,7 @@ STUDIES: dict[str, Study] = {
     study.name: study
     for study in (
         controllers_study.STUDY,
+        gear_shift_study.STUDY,
         estimators_study.STUDY,
         hidden_study.STUDY,
         identification_study.STUDY,

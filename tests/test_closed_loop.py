@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
+from slide_controllers import SLIDE_CONTROLLERS
 
 from controllers import CONTROLLERS
 from linearize.standard import POSITION, standard_modes
@@ -56,7 +57,7 @@ def plant():
 @pytest.fixture(scope="module")
 def designs(plant):
     hybrid = standard_modes(plant)
-    return {name: m.design(hybrid, m.spec()) for name, m in CONTROLLERS.items()}
+    return {name: m.design(hybrid, m.spec()) for name, m in SLIDE_CONTROLLERS.items()}
 
 
 def test_a_command_acts_from_its_own_sample_to_the_next(plant):

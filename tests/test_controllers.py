@@ -4,8 +4,8 @@ import pickle
 
 import numpy as np
 import pytest
+from slide_controllers import SLIDE_CONTROLLERS
 
-from controllers import CONTROLLERS
 from controllers.condensed import MpcSpec
 from controllers.design_file import design, read_design, write_design
 from controllers.linear_mpc import limited_plan, linear_mpc
@@ -18,7 +18,7 @@ from workbench.effects import DeadZone, ValveOffset
 from workbench.errors import InputError
 from workbench.plants.servo_drive import COMMAND, servo_drive
 
-everyone = pytest.mark.parametrize("name", CONTROLLERS)
+everyone = pytest.mark.parametrize("name", SLIDE_CONTROLLERS)
 REST = np.array([0.145, 0.0, 5.65e5, 5.65e5])
 
 
@@ -29,7 +29,7 @@ def hybrid():
 
 @pytest.fixture(scope="module")
 def controllers(hybrid):
-    return {name: m.design(hybrid, m.spec()) for name, m in CONTROLLERS.items()}
+    return {name: m.design(hybrid, m.spec()) for name, m in SLIDE_CONTROLLERS.items()}
 
 
 def seen(state):
@@ -125,7 +125,7 @@ def test_a_wrong_number_in_a_design_is_an_error_that_names_it():
         design("lq", servo_drive(), {"positon_m": 1e-3})
     with pytest.raises(InputError, match=r"lq\.position_m is 'far'; expected a number above 0"):
         design("lq", servo_drive(), {"position_m": "far"})
-    with pytest.raises(KeyError, match="no controller lqg; there is pid, lq, mpc, cascade"):
+    with pytest.raises(KeyError, match="no controller lqg; there is pid, lq, mpc, cascade, hybrid"):
         design("lqg", servo_drive())
 
 
@@ -190,7 +190,7 @@ def test_the_program_of_mpc_has_the_solution_of_a_readable_oracle(controllers, p
     plan, notes = limited_plan(program, g, *program.bounds(unforced), None, 0.1)
 
     assert notes["fallback"] == 0.0
-    assert plan.openings[:5] == pytest.approx(u.value[:5], abs=5e-3)
+    assert plan.openings[:5] == pytest.approx(u.value[:5], abs=1e-3)
 
 
 def test_mpc_without_limits_and_move_cost_is_the_regulator(hybrid):
@@ -231,7 +231,7 @@ def test_mpc_replays_a_run_at_its_limits_to_the_last_bit(hybrid, controllers):
             unforced = program.unforced(states[k], 0.0)
             g = program.gradient(unforced, np.tile([0.28, 0.0, 5.9e5, 5.0e5], 20), 0.1, 0.3)
             plan, notes = limited_plan(program, g, *program.bounds(unforced), None, 0.1)
-            found[k] = (plan.primal, plan.dual, notes)
+            found[k] = (plan.primal, plan.openings, notes)
         return [found[k] for k in range(len(states))]
 
     first = planned(controllers["mpc"].programs.forward[1], range(len(states)))

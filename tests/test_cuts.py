@@ -5,9 +5,9 @@ from math import inf, nan
 
 import numpy as np
 import pytest
+from slide_controllers import SLIDE_CONTROLLERS
 
 import linearize
-from controllers import CONTROLLERS
 from linearize.analysis import require_controllable
 from linearize.cuts import Guard, Interval, Level
 from linearize.equilibrium import operating_point
@@ -194,7 +194,7 @@ def test_no_controller_is_designed_on_modes_out_of_reach():
     hybrid = standard_modes(servo_drive())
     deaf = replace(hybrid, modes=tuple(replace(m, B=0.0 * m.B) for m in hybrid.modes))
 
-    for method in CONTROLLERS.values():
+    for method in SLIDE_CONTROLLERS.values():
         with pytest.raises(InputError, match="not controllable: its commands reach 0 of 4"):
             method.design(deaf, method.spec())
 

@@ -6,8 +6,8 @@ from math import inf, pi
 import numpy as np
 import pytest
 from commands import call
+from slide_controllers import SLIDE_CONTROLLERS
 
-from controllers import CONTROLLERS
 from controllers.margins import (
     Law,
     both_ways_s,
@@ -25,7 +25,7 @@ from workbench.contracts import Estimate
 from workbench.plants.servo_drive import servo_drive
 
 DT = 2e-3
-everyone = pytest.mark.parametrize("name", CONTROLLERS)
+everyone = pytest.mark.parametrize("name", SLIDE_CONTROLLERS)
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +35,7 @@ def hybrid():
 
 @pytest.fixture(scope="module")
 def controllers(hybrid):
-    return {name: m.design(hybrid, m.spec()) for name, m in CONTROLLERS.items()}
+    return {name: m.design(hybrid, m.spec()) for name, m in SLIDE_CONTROLLERS.items()}
 
 
 def proportional(gain):

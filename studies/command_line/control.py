@@ -1,7 +1,8 @@
 """Commands on modes and closed loops: modes, design, check."""
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -20,9 +21,11 @@ from studies.command_line.application import (
 )
 from studies.command_line.files import read_all, writable, write_json
 
+if TYPE_CHECKING:
+    from controllers.design_file import Design
+
 DesignFile = Annotated[Path, typer.Argument(metavar="DESIGN", help="What `design` wrote.")]
 Several = Annotated[int, typer.Option("--runs", metavar="N", min=1, help="Plants to draw.")]
-MISSED = "missed: 0.2 mm at the end of a step, no limit cycle above 0.1 mm, no reference lost"
 CHECK = "workbench check rig.toml lq.toml --estimator mhe --scenario step --figures figures"
 
 
@@ -85,7 +88,8 @@ def modes(
 def design(
     rig: RigFile,
     controller: Annotated[
-        str, typer.Option("--controller", metavar="METHOD", help="pid, lq, mpc or cascade.")
+        str,
+        typer.Option("--controller", metavar="METHOD", help="pid, lq, mpc, cascade; hybrid-mpc."),
     ],
     output: Output,
     spec: Annotated[
@@ -95,12 +99,9 @@ def design(
 ) -> None:
     """One design per mode, written as a file that `check` reads."""
     with answering(quiet) as say:
-        from controllers.certificate import certificate
         from controllers.design_file import design as design_controller
         from controllers.design_file import gains, write_design
-        from controllers.margins import loops, margins, unforeseen_s
         from studies.catalogue_text import read_toml
-        from studies.design_text import certificate_text, margins_text
         from workbench.rig import load_rig
 
         writable(output)
@@ -111,13 +112,26 @@ def design(
         write_design(found, output)
         for name, gain in gains(found.controller):
             typer.echo(f"{name}: {gain}")
-        made = found.controller
-        delay_s = unforeseen_s(found.plant)
-        loop = (found.hybrid, made.laws, made.sample_time_s, delay_s)
-        typer.echo(margins_text(margins(*loop), delay_s))
-        say("looking for a certificate across modes")
-        typer.echo(certificate_text(certificate(loops(*loop), made.sample_time_s)))
+        if found.method == "hybrid-mpc":
+            from studies.design_text import search_text
+
+            typer.echo(search_text(found.controller))
+        else:
+            _certify(found, say)
         typer.echo(f"wrote {output}")
+
+
+def _certify(found: "Design", say: Callable[[str], None]) -> None:
+    """Print the margins of each mode, and what is certified across modes."""
+    from controllers.certificate import certificate
+    from controllers.margins import loops, margins, unforeseen_s
+    from studies.design_text import certificate_text, margins_text
+
+    made, delay_s = found.controller, unforeseen_s(found.plant)
+    loop = (found.hybrid, made.laws, made.sample_time_s, delay_s)
+    typer.echo(margins_text(margins(*loop), delay_s))
+    say("looking for a certificate across modes")
+    typer.echo(certificate_text(certificate(loops(*loop), made.sample_time_s)))
 
 
 @app.command(cls=Spread, epilog=example(CHECK))
@@ -126,10 +140,13 @@ def check(
     design: DesignFile,
     estimator: Annotated[
         list[str] | None,
-        typer.Option("--estimator", metavar="NAME", help="ekf (usual), ukf, imm, mhe."),
+        typer.Option(
+            "--estimator", metavar="NAME", help="ekf (usual), ukf, imm, mhe; not for shifts."
+        ),
     ] = None,
     scenario: Annotated[
-        list[str] | None, typer.Option("--scenario", metavar="NAME", help="step, sine; both.")
+        list[str] | None,
+        typer.Option("--scenario", metavar="NAME", help="step, sine; n-h, h-n, n-l, l-n; all."),
     ] = None,
     runs: Several = 1,
     figures: Figures = None,
@@ -138,18 +155,26 @@ def check(
 ) -> None:
     """Closed loop against the full nonlinear plant; exit code 1 where the goal is missed.
 
+    A gearbox is judged by its four shifts, each beside the open loop on the same plant.
+
     With --runs N > 1 the plant's parameters are drawn from their uncertainty, and the estimator
     keeps the rig's own values.
     """
     with answering(quiet) as say:
-        from studies.checking import check_rig
-        from studies.closed_loop_metrics import table
+        from studies.checking import check_gears, check_rig, shifts_gears
         from studies.documents import check_document
+        from workbench.errors import InputError, Message
         from workbench.rig import load_rig
 
         writable(json, folders=[figures])
         known = load_rig(rig)
-        found = check_rig(known, [design], estimator or ["ekf"], scenario or (), runs, say)
+        if shifts_gears(known):
+            if estimator:
+                what = f"{known.name} has an estimator of its own: leave --estimator out"
+                raise InputError(Message(what))
+            found = check_gears(known, [design], scenario or (), runs, say)
+        else:
+            found = check_rig(known, [design], estimator or ["ekf"], scenario or (), runs, say)
         write_json(json, check_document(known.name, found))
         if figures:
             from studies.checking import styled_figures
@@ -157,7 +182,7 @@ def check(
 
             save_all(styled_figures(found), figures, command_text())
             say(f"figures in {figures}")
-        typer.echo(table(found.rows))
+        typer.echo(found.text)
         if any(row.reached is False for row in found.rows):
-            typer.echo(MISSED, err=True)
+            typer.echo(found.goal, err=True)
             raise typer.Exit(NO)

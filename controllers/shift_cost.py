@@ -1,0 +1,82 @@
+"""What a shift of a gearbox actuator costs, as CasADi functions of one sample and of the last.
+
+    cost = sum dt (d_k + w over_k) + T_end d_N + T_land sum max(|v_k| - v_land, 0)^2
+           + T_land max(v_N - v_safe, 0)^2,   v_safe = v_land - a t + sqrt((a t)^2 + 2 a far_N)
+
+d grows with the distance that is left of a shift and is 1 for the way from Neutral to an end, and
+``over`` is what is gone past Neutral; the second sum is over the samples at which the target is
+reached, and v_safe the speed that a brake with deceleration a after a delay t still takes away.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+
+HIT = 1e-9
+LAST_BIT = 0.25  # share that goes with the root of the distance: a shift ends when it is there
+
+
+@dataclass(frozen=True, kw_only=True)
+class ShiftCost:
+    """Numbers of the cost; times say what one sample of the whole way is worth.
+
+    within_m            distance from the target that costs nothing
+    beyond_m            tolerated past Neutral
+    beyond_weight       w, of what is gone further
+    landing_m_s         v_land at an end; ``neutral_m_s`` at Neutral
+    landing_s           T_land, s per (m/s)^2
+    end_s               T_end
+    brake_m_s2          a
+    brake_after_s       t
+    """
+
+    within_m: float
+    beyond_m: float
+    beyond_weight: float
+    landing_m_s: float
+    neutral_m_s: float
+    landing_s: float
+    end_s: float
+    brake_m_s2: float
+    brake_after_s: float
+
+
+def stage_cost(cost: ShiftCost, stroke_m: float, dt: float) -> ca.Function:
+    """(far before, position, velocity, query) -> (cost in samples, far)."""
+    before, at, speed, query = (
+        ca.SX.sym("before"),
+        ca.SX.sym("x"),
+        ca.SX.sym("v"),
+        ca.SX.sym("q", 3),
+    )
+    target, side, at_stop = ca.vertsplit(query)
+    far = side * (target - at)
+    distance = _distance(cost, stroke_m, far, at_stop)
+    beyond = (1.0 - at_stop) * ca.fmax(-far - cost.beyond_m, 0.0) / stroke_m
+    reached = ca.logic_and(before > HIT, far <= HIT)
+    returned = ca.logic_and(ca.logic_and(before < -HIT, far >= -HIT), 1.0 - at_stop)
+    gentle_m_s = ca.if_else(at_stop, cost.landing_m_s, cost.neutral_m_s)
+    hard = ca.fmax(ca.fabs(speed) - gentle_m_s, 0.0) ** 2 * (cost.landing_s / dt)
+    paid = distance + cost.beyond_weight * beyond + ca.logic_or(reached, returned) * hard
+    return ca.Function("stage", [before, at, speed, query], [paid, far])
+
+
+def end_cost(cost: ShiftCost, stroke_m: float, dt: float) -> ca.Function:
+    """(far, velocity, query) -> cost in samples of what is left at the end of the horizon."""
+    far, speed, query = ca.SX.sym("far"), ca.SX.sym("v"), ca.SX.sym("q", 3)
+    lost_m_s, way_m = cost.brake_m_s2 * cost.brake_after_s, ca.fmax(far, 0.0)
+    gentle_m_s = ca.if_else(query[2], cost.landing_m_s, cost.neutral_m_s)
+    safe_m_s = gentle_m_s - lost_m_s + ca.sqrt(lost_m_s**2 + 2.0 * cost.brake_m_s2 * way_m)
+    fast = ca.fmax(query[1] * speed - safe_m_s, 0.0) ** 2 * (far > HIT)
+    left = _distance(cost, stroke_m, far, query[2])
+    paid = (cost.end_s * left + cost.landing_s * fast) / dt
+    return ca.Function("end", [far, speed, query], [paid])
+
+
+def _distance(cost: ShiftCost, stroke_m: float, far: ca.SX, at_stop: ca.SX) -> ca.SX:
+    """What is left of a shift, 1 for the whole way; past a stop nothing is."""
+    left = ca.if_else(at_stop, far, ca.fabs(far))
+    share = ca.fmax(left - cost.within_m, 0.0) / stroke_m
+    return (1.0 - LAST_BIT) * share + LAST_BIT * ca.sqrt(share)

@@ -1,0 +1,141 @@
+"""What a gearbox actuator does under switching valves, and what that costs: three functions.
+
+``judged`` runs plans through the model of :mod:`linearize.shift_sample` as it is, ``linearised``
+gives its affine modes along one plan, and ``ranked`` the cost of every pair of plans under these
+modes, in which the effects of the two valves add up.  The cost is :mod:`controllers.shift_cost`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import casadi as ca
+import numpy as np
+
+from controllers.shift_cost import ShiftCost, end_cost, stage_cost
+from linearize.shift_sample import half_stroke_m, one_sample, softened
+from linearize.shifting import POSITION
+from workbench.compiled import compiled
+from workbench.errors import InputError, Message, listed
+from workbench.plant import Plant
+
+LONG_S, NEAREST_M = 0.3, 4e-3  # when a shift is over, and how far Neutral swings in the model
+
+
+@dataclass(frozen=True)
+class ShiftPrediction:
+    """Compiled functions over N samples; a query is (target, side, 1 at a stop and 0 at Neutral).
+
+    ``side`` is the sign of the way to the target.
+
+    linearised    (x, shares (2, N)) -> positions and velocities (2 N,), their slopes (2 N, 2 N)
+    ranked        (way (2 N,), D1, D2 (2 N, n), query, x) -> cost of plan i and j at n i + j
+    judged        (x, shares (2, N k), query) -> cost (k,)
+    """
+
+    linearised: ca.Function
+    ranked: ca.Function
+    judged: ca.Function
+
+
+def shift_prediction(
+    plant: Plant, cost: ShiftCost, sample_time_s: float, horizon: int, plans: int, kept: int
+) -> ShiftPrediction:
+    """The functions for ``horizon`` samples, ``plans`` of each valve, ``kept`` pairs to judge."""
+    model, stroke_m = softened(plant), half_stroke_m(plant)
+    stage, end = stage_cost(cost, stroke_m, sample_time_s), end_cost(cost, stroke_m, sample_time_s)
+    stopped = one_sample(model, stroke_m, sample_time_s, stops=True)
+    free = one_sample(model, stroke_m, sample_time_s, stops=False)
+    return ShiftPrediction(
+        linearised=compiled(_linearised(free, horizon)),
+        ranked=compiled(_ranked(stage, end, horizon, plans)),
+        judged=compiled(_judged(stopped, stage, end, horizon, kept)),
+    )
+
+
+def drives(plant: Plant, sample_time_s: float) -> dict[float, tuple[int, int]]:
+    """By dedicated position the commands of both valves that end there when they are held.
+
+    Raises
+    ------
+    InputError
+        If there is a position to which no commands lead from everywhere.
+    """
+    stroke_m, model = half_stroke_m(plant), softened(plant)
+    step = one_sample(model, stroke_m, sample_time_s, stops=True).slice("step", [0, 1], [0])
+    run = step.fold(round(LONG_S / sample_time_s))
+    place = model.states.index(POSITION)
+    places, found = (-stroke_m, 0.0, stroke_m), {}
+    for commands in product((0, 1), repeat=2):
+        x = np.tile(model.initial[:, None], 3)
+        x[place] = places
+        ends = [float(run(start, list(commands))[place]) for start in x.T]
+        for target_m in places:
+            if max(abs(end - target_m) for end in ends) < NEAREST_M:
+                found[target_m] = commands
+    missing = [f"{1e3 * p:g} mm" for p in places if p not in found]
+    if missing:
+        what = f"no commands of {plant.name} lead to {listed(missing)} from everywhere"
+        raise InputError(Message(what, expected="a supply that moves the piston"))
+    return {p: found[p] for p in places}
+
+
+def _linearised(step: ca.Function, horizon: int) -> ca.Function:
+    x, share, now = ca.SX.sym("x", 4), ca.SX.sym("share", 2), ca.SX.sym("now", horizon)
+    slopes = ca.SX.sym("slopes", 4, 2 * horizon)
+    later = step(x, share)[0]
+    A, B = ca.jacobian(later, x), ca.jacobian(later, share)
+    pushed = A @ slopes + ca.horzcat(B[:, 0] @ now.T, B[:, 1] @ now.T)
+    one = ca.Function("one", [x, slopes, share, now], [later, pushed])
+    start, shares = ca.MX.sym("x", 4), ca.MX.sym("shares", 2, horizon)
+    way, slope = [], []
+    at, grown = start, ca.MX(4, 2 * horizon)
+    for k in range(horizon):
+        at, grown = one(at, ca.densify(grown), shares[:, k], ca.DM(np.eye(horizon)[k]))
+        way.append(at[2:])
+        slope.append(grown[2:, :])
+    places = ca.vertcat(*(v[0] for v in way), *(v[1] for v in way))
+    steep = ca.vertcat(*(m[0, :] for m in slope), *(m[1, :] for m in slope))
+    return ca.Function("linearised", [start, shares], [places, steep])
+
+
+def _ranked(stage: ca.Function, end: ca.Function, horizon: int, plans: int) -> ca.Function:
+    n = 2 * horizon
+    way, first, second = (ca.SX.sym(k, n) for k in ("way", "first", "second"))
+    query, x = ca.SX.sym("query", 3), ca.SX.sym("x", 4)
+    at, total = way + first + second, 0.0
+    far = query[1] * (query[0] - x[2])
+    for k in range(horizon):
+        paid, far = stage(far, at[k], at[horizon + k], query)
+        total += paid
+    pair = ca.Function(
+        "pair", [way, first, second, query, x], [ca.cse(total + end(far, at[n - 1], query))]
+    )
+    sizes = ((n, 1), (n, plans), (n, plans), (3, 1), (4, 1))
+    inputs = [ca.MX.sym(f"i{k}", *size) for k, size in enumerate(sizes)]
+    left = np.repeat(np.arange(plans), plans).tolist()
+    right = np.tile(np.arange(plans), plans).tolist()
+    many = pair.map("pairs", "serial", plans**2, [0, 3, 4], [])
+    costs = many(inputs[0], inputs[1][:, left], inputs[2][:, right], *inputs[3:])
+    return ca.Function("ranked", inputs, [costs.T])
+
+
+def _judged(
+    step: ca.Function, stage: ca.Function, end: ca.Function, horizon: int, kept: int
+) -> ca.Function:
+    x, share, query = ca.SX.sym("x", 4), ca.SX.sym("share", 2), ca.SX.sym("query", 3)
+    far, total = ca.SX.sym("far"), ca.SX.sym("total")
+    later, met_m_s = step(x, share)
+    paid, left = stage(far, later[2], met_m_s, query)
+    memory = ca.vertcat(x, far, total)
+    result = ca.vertcat(later, left, total + paid)
+    one = ca.Function("one", [memory, share, query], [result])
+    start, shares = ca.MX.sym("x", 4), ca.MX.sym("shares", 2, horizon)
+    asked = ca.MX.sym("query", 3)
+    begun = ca.vertcat(start, asked[1] * (asked[0] - start[2]), 0.0)
+    done = one.fold(horizon)(begun, shares, ca.repmat(asked, 1, horizon))
+    plan = ca.Function("plan", [start, shares, asked], [done[5] + end(done[4], done[3], asked)])
+    many = plan.map("plans", "serial", kept, [0, 2], [])
+    inputs = [start, ca.MX.sym("all", 2, horizon * kept), asked]
+    return ca.Function("judged", inputs, [many(*inputs).T])

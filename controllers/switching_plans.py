@@ -1,0 +1,53 @@
+"""All plans of one switching valve over a horizon, blocked to a few instants of switching.
+
+A valve switches at most twice in a plan.  With a new plan at every sample that is no limit on what
+it does, only on what it foresees.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from linearize.valve_response import packed
+
+INSTANTS = (0, 1, 2, 4, 7, 10, 14)  # samples ahead, fine where a plan is about to be carried out
+NEVER = 1e6  # switches of what only fills up a set: it is never chosen
+
+
+@dataclass(frozen=True)
+class Plans:
+    """Plans of one valve, filled up to the size of the largest set with plans that count as none.
+
+    commands    shape (n, N)
+    packed      the same as integers, see :func:`linearize.valve_response.packed`
+    switches    of each, shape (n,)
+    """
+
+    commands: np.ndarray
+    packed: np.ndarray
+    switches: np.ndarray
+
+
+@cache
+def plans(level: int, wait: int, hold: int, horizon: int) -> Plans:
+    """Plans of a valve whose command is ``level``, and may first change after ``wait`` samples."""
+    times, size = switching_times(wait, hold), len(switching_times(0, hold))
+    times += [()] * (size - len(times))
+    commands = np.full((size, horizon), level)
+    for row, switched in zip(commands, times, strict=True):
+        for k in switched:
+            row[k:] = 1 - row[k:]
+    switches = np.array([float(len(t)) for t in times])
+    real = len(switching_times(wait, hold))
+    switches[real:] = NEVER
+    return Plans(commands, packed(commands), switches)
+
+
+def switching_times(wait: int, hold: int) -> list[tuple[int, ...]]:
+    """No switch, one, and two at least ``hold`` samples apart; none before ``wait``."""
+    allowed = sorted({max(k, wait) for k in INSTANTS})
+    twice = [(first, then) for first in allowed for then in allowed if then - first >= hold]
+    return [(), *((k,) for k in allowed), *twice]

@@ -1,0 +1,39 @@
+"""Figures of gear shifts in closed loop: position, and the commands of both valves below."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from linearize.shifting import POSITION
+from studies.shift_check import SETTLED_M, ShiftCheck
+from workbench.plants.gearbox import COMMANDS
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def shift_figures(found: ShiftCheck) -> dict[str, Figure]:
+    """One figure per shift, by file name without ending; the band is where a shift is settled."""
+    from matplotlib.figure import Figure
+
+    figures = {}
+    for scenario in dict.fromkeys(row.scenario for row in found.rows):
+        figure = Figure(figsize=(3.5, 3.2), layout="constrained")
+        place, *valves = figure.subplots(3, sharex=True, height_ratios=(4, 1, 1))
+        pairs = zip(found.rows, found.records, strict=True)
+        for k, (row, record) in enumerate(p for p in pairs if p[0].scenario == scenario):
+            recording = record.recording
+            time_ms, line = 1e3 * recording.time_s, {"color": f"C{k % 8}", "label": row.design}
+            place.plot(time_ms, 1e3 * recording[POSITION], **line)
+            for axes, command in zip(valves, COMMANDS, strict=True):
+                axes.step(time_ms, recording[command], where="post", **line)
+        target_mm = 1e3 * recording[f"reference.{POSITION}"][-1]
+        band_mm = 1e3 * SETTLED_M
+        place.axhspan(target_mm - band_mm, target_mm + band_mm, color="0.8", label="settled")
+        place.set_ylabel("main piston (mm)")
+        for axes, label in zip(valves, ("valve 1", "valve 2"), strict=True):
+            axes.set(ylabel=label, ylim=(-0.2, 1.2), yticks=(0, 1))
+        valves[-1].set_xlabel("time (ms)")
+        figure.legend(*place.get_legend_handles_labels(), loc="outside upper center", ncols=3)
+        figures[f"shift_{scenario}"] = figure
+    return figures

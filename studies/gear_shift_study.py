@@ -1,0 +1,150 @@
+"""Study ``gear-shifts``: which design shifts the gearbox fast and softly, and on how many plants.
+
+Designs side by side at the plant's own supply; hybrid MPC with the same numbers at 7 to 10 bar; and
+hybrid MPC on plants drawn from their uncertainty, which design and filter do not know.
+
+Source: paper 003 and its follow-up, Appl. Sci. 2020, 10(10), 3514, which ranks scheduled designs
+above LQ and LQ above PD; physics.md 7, case 4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from controllers.design_file import design
+from controllers.switched_feedback import averaged, switched_lq, switched_pd
+from linearize.standard import shift_modes
+from studies.checking import drawn, styled_figures
+from studies.shift_check import SHIFTS, Shift, ShiftCheck, check_shifts, shift_table
+from studies.study import Claim, Extent, Outcome, Study
+from workbench.contracts import Controller
+from workbench.plant import Plant
+from workbench.plants.gearbox import gearbox
+from workbench.rig import default_rig
+
+SUPPLIES_PA = (7e5, 8e5, 9e5, 10e5)
+DRAWS = {Extent.QUICK: 3, Extent.FULL: 30}
+FIRST_SEED = 1  # of the draws
+SUPPLY = "supply.pressure_pa"
+HYBRID, PD, LQ, SCHEDULED = "hybrid MPC", "PD", "LQ", "scheduled LQ"
+
+
+def run(folder: Path, extent: Extent, say: Callable[[str], None]) -> Outcome:
+    """All of it, anew at every call; nothing is kept in ``folder``."""
+    say("designs side by side")
+    beside = check_shifts(gearbox(), designs(gearbox()), SHIFTS)
+    supplies = {}
+    for supply_pa in SUPPLIES_PA:
+        say(f"supply of {1e-5 * supply_pa:g} bar")
+        plant = gearbox().with_values({SUPPLY: supply_pa})
+        supplies[supply_pa] = check_shifts(plant, {HYBRID: hybrid(plant)}, SHIFTS).rows
+    rows = [row for k in range(DRAWS[extent]) for row in _draw(k, say)]
+    text = "\n\n".join(
+        [
+            shift_table(beside.rows),
+            *(f"{1e-5 * p:g} bar\n{shift_table(found)}" for p, found in supplies.items()),
+            f"{DRAWS[extent]} draws, missed by\n{_missed(rows)}",
+        ]
+    )
+    claims = (*_claims(beside.rows, supplies), *_claims_of_draws(rows))
+    numbers = {
+        "beside": [vars(row) for row in beside.rows],
+        "supplies": {f"{1e-5 * p:g} bar": [vars(r) for r in f] for p, f in supplies.items()},
+        "draws": {name: _reached(rows, name) for name in SHIFTS},
+    }
+    return Outcome(text, claims, styled_figures(_shown(beside)), _plain(numbers))
+
+
+def designs(plant: Plant) -> dict[str, Controller]:
+    """Hybrid MPC and its rivals, the last two behind PWM."""
+    modes = shift_modes(plant)
+    pd, scheduled = switched_pd(modes), switched_lq(modes, scheduled=True)
+    return {
+        HYBRID: hybrid(plant),
+        PD: pd,
+        LQ: switched_lq(modes, scheduled=False),
+        SCHEDULED: scheduled,
+        f"{PD}, PWM": averaged(pd),
+        f"{SCHEDULED}, PWM": averaged(scheduled),
+    }
+
+
+def hybrid(plant: Plant) -> Controller:
+    """Hybrid MPC with its own numbers."""
+    return design("hybrid-mpc", plant).controller
+
+
+def _draw(number: int, say: Callable[[str], None]) -> tuple[Shift, ...]:
+    say(f"draw {number + 1}")
+    plant = gearbox()
+    truth = drawn(default_rig(plant), np.random.default_rng(FIRST_SEED + number))
+    made = {f"{HYBRID} {number + 1}": hybrid(plant)}
+    return check_shifts(truth, made, SHIFTS, believed=plant, seed=number).rows
+
+
+def _reached(rows: Iterable[Shift], scenario: str) -> float:
+    """Share of the draws in which a shift is fast and soft."""
+    return float(np.mean([row.reached for row in rows if row.scenario == scenario]))
+
+
+def _settling_s(rows: Iterable[Shift], name: str) -> float:
+    """Sum over the four shifts of one design."""
+    return sum(row.settling_s for row in rows if row.design == name)
+
+
+def _claims(rows: Iterable[Shift], supplies: Mapping[float, Iterable[Shift]]) -> Iterator[Claim]:
+    missed = [
+        f"{row.scenario} at {1e-5 * p:g} bar"
+        for p, found in supplies.items()
+        for row in found
+        if not row.reached
+    ]
+    told = f"missed: {', '.join(missed)}" if missed else "all"
+    yield Claim(f"{HYBRID}: four shifts fast and soft at 7 to 10 bar", told, not missed)
+    rivals = [row for row in rows if row.design != HYBRID and row.reached]
+    told = ", ".join(f"{row.design} {row.scenario}" for row in rivals) or "none"
+    yield Claim("no rival makes any of the shifts fast and soft", told, not rivals)
+    times = [_settling_s(rows, name) for name in (SCHEDULED, LQ, PD)]
+    told = ", ".join(f"{1e3 * time:.0f} ms" for time in times)
+    claim = "all four shifts take least time scheduled, more by LQ, most by PD"
+    yield Claim(claim, told, times == sorted(times))
+
+
+def _claims_of_draws(rows: Iterable[Shift]) -> Iterator[Claim]:
+    for name in SHIFTS:
+        share = _reached(rows, name)
+        claim = f"{HYBRID}: {name} is fast and soft on every drawn plant"
+        yield Claim(claim, f"{100.0 * share:.0f} % of them", share == 1.0)
+
+
+def _missed(rows: Iterable[Shift]) -> str:
+    return shift_table([row for row in rows if not row.reached]) or "none"
+
+
+def _shown(beside: ShiftCheck) -> ShiftCheck:
+    """What a figure has room for."""
+    pairs = zip(beside.rows, beside.records, strict=True)
+    kept = [(row, record) for row, record in pairs if row.design in (HYBRID, PD, SCHEDULED)]
+    return ShiftCheck(*map(tuple, zip(*kept, strict=True)))
+
+
+def _plain(value: object) -> object:
+    """Numbers that JSON knows; what is not finite is None."""
+    if isinstance(value, Mapping):
+        return {key: _plain(each) for key, each in value.items()}
+    if isinstance(value, list):
+        return [_plain(each) for each in value]
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
+    return value
+
+
+STUDY = Study(
+    name="gear-shifts",
+    question="which design shifts the gearbox fast and softly at any supply, and on drawn plants?",
+    source="paper 003 and Appl. Sci. 2020, 10(10), 3514",
+    run=run,
+)

@@ -1,0 +1,234 @@
+"""Gear shifts in closed loop against the full nonlinear actuator: four shifts, what each is worth.
+
+A shift is fast if it settles in 1.25 times the time of the open loop, which drives without brake;
+soft if it lands with half of its speed, or 0.5 m/s; and no shift to Neutral goes past it by 0.5 mm.
+The open loop is run on the same plant, so that the bounds follow a drawn plant and its supply.
+
+Noise by physics.md section 2; the filter's process noise is chosen, large enough for a supply that
+is off by a bar and for friction that is off by half.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+
+from controllers.shift_prediction import drives
+from estimators.shift_filter import ShiftFilter
+from linearize.shift_sample import half_stroke_m
+from linearize.shifting import POSITION, PRESSURES, VELOCITY
+from studies.text import columns, number
+from workbench.closed_loop import Hardware, LoopRecord, close_loop
+from workbench.contracts import Command, Controller, Estimate
+from workbench.filtering import consistent_start
+from workbench.plant import Plant
+from workbench.plants.gearbox import FINGER_M, FLOATING, MAIN
+
+SAMPLE_TIME_S, LASTS_S = 2.5e-4, 0.08
+SETTLED_M, OVERSHOT_M = 0.3e-3, 0.5e-3
+SLOWER, SOFTER, SOFT_M_S = 1.25, 0.5, 0.5
+NOISE = {**dict.fromkeys(PRESSURES, 1e3), POSITION: 2e-5}
+PROCESS = {
+    "chamber_1.pressure_pa": 2e5,
+    "chamber_2.pressure_pa": 2e5,
+    POSITION: 1e-4,
+    VELOCITY: 2.0,
+}
+SHIFTS = {"n-h": (0.0, 1.0), "h-n": (1.0, 0.0), "n-l": (0.0, -1.0), "l-n": (-1.0, 0.0)}
+"""Start and target of each shift in half strokes, by its name on the command line."""
+
+
+@dataclass(frozen=True)
+class Drive:
+    """The open loop: the commands that lead to the target, held."""
+
+    commands: tuple[int, int]
+    sample_time_s: float = 1e-3
+    preview: int = 1
+
+    def start(self) -> Command:
+        return Command(np.zeros(2))
+
+    def step(self, last: Command, reference: np.ndarray, estimate: Estimate) -> Command:
+        return Command(np.array(self.commands, dtype=float))
+
+
+@dataclass(frozen=True)
+class Shift:
+    """One shift in closed loop; times from the first sample.
+
+    settling_s          until the piston stays within 0.3 mm of its place
+    impact_m_s          largest speed with which two parts meet: pistons, stops, shoulder
+    overshoot_m         past Neutral; 0 for a shift to an end
+    air_kg, switches    taken from the supply, and how often the valves switch
+    longest_s, hardest_m_s    what the open loop allows on this plant
+    """
+
+    design: str
+    scenario: str
+    settling_s: float
+    impact_m_s: float
+    overshoot_m: float
+    air_kg: float
+    switches: float
+    longest_s: float
+    hardest_m_s: float
+    solve_median_s: float
+    solve_p99_s: float
+
+    @property
+    def reached(self) -> bool:
+        """True when it is fast, soft, and not past Neutral."""
+        fast, soft = self.settling_s <= self.longest_s, self.impact_m_s <= self.hardest_m_s
+        return fast and soft and self.overshoot_m < OVERSHOT_M
+
+
+@dataclass(frozen=True)
+class ShiftCheck:
+    """Shifts and their records, in the same order."""
+
+    rows: tuple[Shift, ...]
+    records: tuple[LoopRecord, ...]
+
+    goal = (
+        "missed: 1.25 times the time of the open loop, half of its landing speed or 0.5 m/s, "
+        "0.5 mm past Neutral"
+    )
+
+    @property
+    def text(self) -> str:
+        """All rows as a table."""
+        return shift_table(self.rows)
+
+
+def check_shifts(
+    plant: Plant,
+    designs: Mapping[str, Controller],
+    scenarios: Iterable[str],
+    *,
+    believed: Plant | None = None,
+    seed: int = 0,
+) -> ShiftCheck:
+    """Every design in every shift, each beside the open loop.
+
+    Parameters
+    ----------
+    believed
+        The plant in the estimator, the same one by default.
+    """
+    truth, model = plant.lean(), (believed or plant).lean()
+    leading, rows, records = drives(plant, 1e-3), [], []
+    for scenario in scenarios:
+        target_m = SHIFTS[scenario][1] * half_stroke_m(plant)
+        open_loop = Drive(leading[target_m])
+        bound = _measured(
+            truth, run(truth, open_loop, shift_filter(model, 1e-3), scenario, seed), scenario
+        )
+        for design, controller in designs.items():
+            observer = shift_filter(model, controller.sample_time_s)
+            record = run(truth, controller, observer, scenario, seed)
+            rows.append(
+                replace(
+                    _measured(truth, record, scenario),
+                    design=design,
+                    longest_s=SLOWER * bound.settling_s,
+                    hardest_m_s=max(SOFTER * bound.impact_m_s, SOFT_M_S),
+                )
+            )
+            records.append(record)
+    return ShiftCheck(tuple(rows), tuple(records))
+
+
+@cache
+def shift_filter(plant: Plant, sample_time_s: float) -> ShiftFilter:
+    """The estimator of a plant, made once: its tables take longer than a shift."""
+    return ShiftFilter(
+        plant=plant, sample_time_s=sample_time_s, measurement_noise=NOISE, process_noise=PROCESS
+    )
+
+
+def run(
+    plant: Plant, controller: Controller, estimator: ShiftFilter, scenario: str, seed: int
+) -> LoopRecord:
+    """One shift from rest, vented, with the noise of the sensors."""
+    start, target = (share * half_stroke_m(plant) for share in SHIFTS[scenario])
+    n = round(LASTS_S / SAMPLE_TIME_S)
+    places = {POSITION: start, f"{FLOATING}.position_m": max(start, 0.0)}
+    places["finger.angle_rad"] = start / FINGER_M
+    return close_loop(
+        plant,
+        controller,
+        estimator,
+        {POSITION: np.full(n, target)},
+        initial=consistent_start(plant, places),
+        hardware=Hardware(noise=NOISE),
+        sample_time_s=SAMPLE_TIME_S,
+        seed=seed,
+    )
+
+
+def _measured(plant: Plant, record: LoopRecord, scenario: str) -> Shift:
+    """What one run shows; its bounds are infinite."""
+    from studies.closed_loop_metrics import air_used_kg
+
+    recording, (start, target) = record.recording, SHIFTS[scenario]
+    end_m = half_stroke_m(plant)
+    gone = recording[POSITION] - target * end_m
+    outside = np.flatnonzero(np.abs(gone) > SETTLED_M)
+    settled = outside[-1] + 1 if len(outside) else 0
+    past = np.sign(target - start) * gone if target == 0.0 else np.zeros(1)
+    commands = recording.rows(plant.model.commands)
+    return Shift(
+        design="open loop",
+        scenario=scenario,
+        settling_s=settled * SAMPLE_TIME_S if settled < len(gone) else np.inf,
+        impact_m_s=impact_m_s(record, end_m),
+        overshoot_m=float(max(past.max(), 0.0)),
+        air_kg=air_used_kg(plant, record, SAMPLE_TIME_S),
+        switches=float(np.abs(np.diff(commands, prepend=0.0)).sum()),
+        longest_s=np.inf,
+        hardest_m_s=np.inf,
+        solve_median_s=float(np.median(record.control_time_s)),
+        solve_p99_s=float(np.percentile(record.control_time_s, 99)),
+    )
+
+
+def impact_m_s(record: LoopRecord, end_m: float) -> float:
+    """Largest speed with which pistons meet each other, their stops, or the shoulder."""
+    rows = record.recording
+    x, v = rows[f"{MAIN}.position_m"], rows[f"{MAIN}.velocity_m_s"]
+    x_f, v_f = rows[f"{FLOATING}.position_m"], rows[f"{FLOATING}.velocity_m_s"]
+    pairs = (
+        (x + end_m, -v),
+        (end_m - x, v),
+        (x_f, -v_f),
+        (end_m - x_f, v_f),
+        (x_f - x, v - v_f),
+    )
+    hardest = 0.0
+    for gap, closing in pairs:
+        met = np.flatnonzero((gap[:-1] > 0.0) & (gap[1:] <= 0.0))
+        hardest = max([hardest, *closing[met], *closing[met + 1]])
+    return float(hardest)
+
+
+HEAD = ("design", "shift", "reached", "settle ms", "at most", "impact m/s", "at most",
+        "over mm", "air g", "switches", "ctrl us", "p99 us")  # fmt: skip
+
+
+def shift_table(rows: Iterable[Shift]) -> str:
+    """The shifts as text, with the bounds beside what they bound."""
+    return columns(HEAD, [_row(row) for row in rows])
+
+
+def _row(row: Shift) -> tuple[str, ...]:
+    numbers = (
+        1e3 * row.settling_s, 1e3 * row.longest_s, row.impact_m_s, row.hardest_m_s,
+        1e3 * row.overshoot_m, 1e3 * row.air_kg, row.switches,
+        1e6 * row.solve_median_s, 1e6 * row.solve_p99_s,
+    )  # fmt: skip
+    words = (row.design, row.scenario, "yes" if row.reached else "no")
+    return (*words, *(number(value, 4) for value in numbers))

@@ -1,0 +1,224 @@
+"""Hybrid MPC of the gearbox: what it predicts, what it searches, and what its shifts do."""
+
+import numpy as np
+import pytest
+from commands import call
+from gearbox_shifts import held
+from hypothesis import given
+from hypothesis import strategies as st
+
+from controllers.design_file import design, read_design, write_design
+from controllers.hybrid_mpc import HybridMpcSpec, flips
+from controllers.switching_plans import NEVER, plans, switching_times
+from linearize.shift_sample import half_stroke_m, one_sample, softened
+from linearize.shifting import STATES
+from linearize.valve_response import MASK, admissible, age, packed, valve_response
+from studies.shift_check import OVERSHOT_M, SHIFTS, check_shifts
+from workbench.called import called
+from workbench.contracts import Estimate
+from workbench.errors import InputError
+from workbench.plants.gearbox import COMMANDS, gearbox
+from workbench.plants.servo_drive import servo_drive
+from workbench.recording import Recording
+from workbench.simulation import simulate
+
+HOLD, N = 4, 26
+VENTED = np.array([1.013e5, 1.013e5, 0.0, 0.0])
+
+
+@pytest.fixture(scope="module")
+def response():
+    return valve_response(gearbox(), "valve_1", 1e-3, HOLD)
+
+
+@pytest.fixture(scope="module")
+def made():
+    return design("hybrid-mpc", gearbox()).controller
+
+
+def seen(x):
+    return Estimate(STATES, np.array(x, dtype=float), np.eye(4))
+
+
+def to(place_m):
+    return np.array([[place_m]])
+
+
+def test_a_valve_held_for_long_passes_all_or_nothing(response):
+    assert response.newest(0) == pytest.approx(0.0, abs=1e-6)
+    assert response.newest(MASK) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_a_valve_opens_late_closes_later_and_bounces(response):
+    on = response.ahead(0, packed(np.ones(20, dtype=int)))
+    off = response.ahead(MASK, packed(np.zeros(20, dtype=int)))
+
+    assert on[1] < 0.02 and on[6] > 0.98  # physics.md 2.5: lift from 1.9 ms, full at 3.8 ms
+    assert off[2] > 0.98 and off[5] < 0.9  # lift falls from 3.9 ms on
+    assert (np.diff(off) > 0.1).any()
+
+
+def test_a_valve_that_is_switched_too_soon_is_refused(response):
+    with pytest.raises(ValueError, match="switches a valve twice within 4 samples"):
+        response.ahead(0, packed(np.array([1, 0, 0, 0])))
+
+
+@given(st.integers(0, 1), st.integers(0, HOLD))
+def test_every_plan_keeps_the_least_time_between_switches(response, level, wait):
+    found = plans(level, wait, HOLD, N)
+    newest = np.array([*[1 - level] * 16, *[level] * 20])[-20 - (HOLD - wait) :][:20]
+    past = int(packed(newest)[-1]) if wait else level * MASK
+
+    assert len(found.switches) == len(switching_times(0, HOLD))
+    for row, count in zip(found.commands, found.switches, strict=True):
+        changes = np.flatnonzero(np.diff([level, *row]))
+        assert count in (len(changes), NEVER)
+        assert (np.diff(changes) >= HOLD).all()
+        assert (changes >= wait).all()
+    assert response.keeps(level * MASK if not wait else past, found.packed).all() or wait
+
+
+def test_all_histories_keep_the_least_time_and_no_other_does():
+    for row in admissible(HOLD):
+        changes = np.flatnonzero(np.diff(row))
+        assert (np.diff(changes) >= HOLD).all()
+    kept = {tuple(row[:8]) for row in admissible(HOLD)}
+    every = (tuple(int(b) for b in f"{k:08b}") for k in range(256))
+    valid = {b for b in every if (np.diff(np.flatnonzero(np.diff(b))) >= HOLD).all()}
+
+    assert kept == valid
+
+
+@given(st.integers(0, MASK))
+def test_the_age_of_a_command_is_counted_from_its_last_change(history):
+    bits = f"{history:020b}"
+    assert age(history) == len(bits) - len(bits.rstrip(bits[-1]))
+
+
+def test_the_reduced_sample_follows_the_whole_plant_through_a_braked_shift(response):
+    ahead = held([((1, 0), 0.010), ((1, 1), 0.006), ((1, 0), 0.006)], 1e-3)[:, :-1].astype(int)
+    fine = np.column_stack([np.repeat(ahead, 4, axis=1), ahead[:, -1]]).astype(float)
+    channels = dict(zip(COMMANDS, fine, strict=True))
+    plant = gearbox().lean()
+    truth = simulate(plant, Recording("shift", 2.5e-4, channels)).rows(STATES)[:, 4::4]
+    step = one_sample(softened(plant), half_stroke_m(plant), 1e-3, stops=True)
+    shares, x, rows = [response.ahead(0, packed(row)) for row in ahead], VENTED, []
+    for pair in np.transpose(shares):
+        x = step(x, pair)[0].full().ravel()
+        rows.append(x)
+    error = np.abs(np.array(rows).T - truth).max(axis=1)
+
+    assert error[2] < 0.4e-3 and error[3] < 0.15
+    assert (error[:2] < 3e4).all()
+
+
+def test_the_affine_modes_along_a_plan_cost_what_the_nonlinear_model_does(made):
+    """Where nothing stops the piston, the pair that changes nothing has the cost of the plan."""
+    horizon = HybridMpcSpec().horizon
+    plan = np.zeros((2, horizon), dtype=int)
+    plan[1] = 1  # towards Low, which it does not reach within the horizon
+    query, count = np.array([-12e-3, -1.0, 1.0]), len(made.plans(0).switches)
+    shares = np.array(
+        [r.ahead(0, packed(row)) for r, row in zip(made.responses, plan, strict=True)]
+    )
+    way, _ = called(made.prediction.linearised, VENTED, shares)
+    nothing = np.zeros((2 * horizon, count))
+    ranked = called(made.prediction.ranked, way, nothing, nothing, query, VENTED)[0]
+    many = np.tile(shares, (1, made.spec.judged + 1))
+    judged = called(made.prediction.judged, VENTED, many, query)[0]
+
+    assert ranked == pytest.approx(np.full(ranked.shape, judged[0, 0]), rel=1e-9)
+
+
+def test_the_slopes_along_a_plan_are_those_of_the_nonlinear_model(made):
+    horizon = HybridMpcSpec().horizon
+    shares = np.full((2, horizon), 0.5)
+    x = np.array([4e5, 3e5, -6e-3, 0.5])
+    way, slope = called(made.prediction.linearised, x, shares)
+    for valve, sample in ((0, 2), (1, 7)):
+        moved = shares.copy()
+        moved[valve, sample] += 1e-6
+        change = (called(made.prediction.linearised, x, moved)[0] - way)[:15, 0] / 1e-6
+
+        assert slope[:15, valve * horizon + sample] == pytest.approx(change, rel=1e-3, abs=1e-7)
+
+
+def test_flips_are_every_command_and_every_two_neighbours():
+    assert flips(3).tolist() == [[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [0, 1, 1]]
+
+
+def test_it_gives_the_same_answer_twice_and_drives_towards_the_target(made):
+    for place_m in (-12e-3, 12e-3):
+        first, again = (made.step(made.start(), to(place_m), seen(VENTED)) for _ in range(2))
+
+        assert np.array_equal(first.memory.plan, again.memory.plan)
+        assert first.memory.plan[1 if place_m < 0 else 0].any()
+
+
+def test_at_rest_on_target_nothing_switches(made):
+    command = made.start()
+    for _ in range(5):
+        command = made.step(command, to(0.0), seen([1.013e5, 1.013e5, 5e-5, 0.0]))
+        command = made.step(command, to(0.0), seen([1.013e5, 1.013e5, -5e-5, 0.0]))
+
+    assert command.memory.sent == (0, 0)
+
+
+def test_without_an_answer_the_last_plan_goes_on(made):
+    before = made.step(made.start(), to(12e-3), seen(VENTED))
+    lost = made.step(before, to(12e-3), seen([np.nan] * 4))
+
+    assert lost.notes["fallback"] == 1.0
+    assert np.array_equal(lost.memory.plan[:, :-1], before.memory.plan[:, 1:])
+
+
+def test_a_place_between_the_dedicated_ones_is_refused(made):
+    with pytest.raises(InputError, match="cannot hold the main piston at 5 mm; expected -12 or 0"):
+        made.step(made.start(), to(5e-3), seen(VENTED))
+
+
+def test_a_plant_without_switching_valves_is_refused():
+    with pytest.raises(KeyError, match="no modes to shift gears with for servo_drive"):
+        design("hybrid-mpc", servo_drive())
+
+
+def test_more_to_judge_than_there_is_is_refused():
+    with pytest.raises(InputError, match=r"hybrid-mpc\.judged is"):
+        design("hybrid-mpc", gearbox(), {"judged": 400, "hold_s": 2e-2})
+
+
+def test_a_shift_from_low_to_neutral_lands_softly_where_driving_overshoots(tmp_path):
+    path = tmp_path / "design.toml"
+    write_design(design("hybrid-mpc", gearbox()), path)
+    found = check_shifts(gearbox(), {"mpc": read_design(path).controller}, ["l-n"])
+    (row,), (record,) = found.rows, found.records
+    commands = record.recording.rows(COMMANDS)[:, ::4]
+
+    assert row.reached and row.overshoot_m < OVERSHOT_M
+    for valve in commands:
+        assert (np.diff(np.flatnonzero(np.diff(valve))) >= HOLD).all()
+    assert set(np.unique(commands)) <= {0.0, 1.0}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("supply_bar", [7, 8, 9, 10])
+def test_all_four_shifts_are_fast_and_soft_at_any_supply_without_retuning(supply_bar):
+    plant = gearbox().with_values({"supply.pressure_pa": 1e5 * supply_bar})
+    found = check_shifts(plant, {"mpc": design("hybrid-mpc", plant).controller}, SHIFTS)
+
+    assert [row.scenario for row in found.rows if not row.reached] == []
+
+
+def test_the_commands_design_and_check_a_gearbox(tmp_path):
+    rig, made = tmp_path / "g.toml", tmp_path / "d.toml"
+    rig.write_text('plant = "gearbox"\n')
+    answer = call("design", rig, "--controller", "hybrid-mpc", "-o", made)
+    assert answer.exit_code == 0, answer.output
+    assert "commands 1, 1 lead to 0 mm" in answer.stdout
+    answer = call("check", rig, made, "--scenario", "n-h", "--json", tmp_path / "j.json")
+    assert answer.exit_code == 0, answer.output
+    answer = call("check", rig, made, "--scenario", "step")
+    assert answer.exit_code == 2
+    answer = call("check", rig, made, "--estimator", "ekf")
+    assert answer.exit_code == 2
+    assert "leave --estimator out" in answer.stderr
