@@ -54,7 +54,7 @@ def _replaced(spec: Any, numbers: object, where: str) -> tuple[Any, list[Message
     known = {f.name: f for f in fields(spec)}
     if not isinstance(numbers, Mapping):
         expected = f"a table of some of {listed(known)}"
-        return spec, [Message(f"{where} is {numbers!r}", expected=expected)]
+        return spec, [Message(f"{numbers!r} is no table", where, expected)]
     values = {name: getattr(spec, name) for name in known}
     wrong: list[Message] = []
     for key, value in numbers.items():
@@ -65,7 +65,7 @@ def _replaced(spec: Any, numbers: object, where: str) -> tuple[Any, list[Message
             values[key], more = _replaced(values[key], value, inside)
             wrong += more
         elif expected := _refused(known[key], values[key], value):
-            wrong.append(Message(f"{inside} is {value!r}", expected=expected))
+            wrong.append(Message(f"is {value!r}", inside, expected))
         else:
             values[key] = type(values[key])(value)
     return (spec if wrong else type(spec)(**values)), wrong
@@ -91,4 +91,4 @@ def _unknown(spec: Any, key: str, where: str) -> Message:
         for f in fields(getattr(spec, name))
     }
     near = nearest(key, names) or deeper.get(nearest(key, deeper), "")
-    return Message(f"{where} has no {key}", expected=f"one of {listed(names)}", nearest=near)
+    return Message(f"{where} has no such number", f"{where}.{key}", f"one of {listed(names)}", near)

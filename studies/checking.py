@@ -53,10 +53,9 @@ def check_rig(
     names = tuple(scenarios) or tuple(SCENARIOS)
     require(names, SCENARIOS, "the list of scenarios")
     controllers = _controllers(rig, designs)
-    rows, records, rng = [], [], np.random.default_rng(0)
-    for number in range(runs):
+    rows, records = [], []
+    for number, plant in enumerate(drawn_plants(rig, runs)):
         progress(f"closed loop, run {number + 1} of {runs}")
-        plant = drawn(rig, rng) if number else rig.plant
         found = check(plant, controllers, estimators, names, believed=rig.plant, seed=number)
         for row, record in zip(found.rows, found.records, strict=True):
             run = f"{row.scenario} with {row.design}"
@@ -89,10 +88,9 @@ def check_gears(
     names = tuple(scenarios) or tuple(SHIFTS)
     require(names, SHIFTS, "the list of shifts")
     controllers = _controllers(rig, designs)
-    rows, records, rng = [], [], np.random.default_rng(0)
-    for number in range(runs):
+    rows, records = [], []
+    for number, plant in enumerate(drawn_plants(rig, runs)):
         progress(f"shifts, run {number + 1} of {runs}")
-        plant = drawn(rig, rng) if number else rig.plant
         found = check_shifts(plant, controllers, names, believed=rig.plant, seed=number)
         mark = f" {number + 1}" if runs > 1 else ""
         rows += [replace(row, design=row.design + mark) for row in found.rows]
@@ -131,6 +129,12 @@ def differences(designed: Plant, real: Plant) -> list[str]:
         for name, value in ours.items()
         if name in theirs and not isclose(theirs[name], value, rel_tol=1e-9)
     ]
+
+
+def drawn_plants(rig: Rig, runs: int) -> tuple[Plant, ...]:
+    """The plants of so many runs, the same at every call: the rig's own, then drawn ones."""
+    rng = np.random.default_rng(0)
+    return (rig.plant, *(drawn(rig, rng) for _ in range(runs - 1)))
 
 
 def drawn(rig: Rig, rng: np.random.Generator) -> Plant:

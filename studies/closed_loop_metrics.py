@@ -9,6 +9,7 @@ from math import inf, isnan, nan
 import numpy as np
 
 from linearize.axes import stroke_m
+from linearize.reduction import closed_command
 from linearize.standard import POSITION, PRESSURES, SUPPLY
 from studies.scenarios import LATE_S, SAMPLE_TIME_S, Scenario
 from workbench.closed_loop import LoopRecord
@@ -16,6 +17,7 @@ from workbench.plant import Plant
 
 SETTLED_M, GOAL_CYCLE_M = 0.2e-3, 0.1e-3
 LOST_SHARE = 0.1  # of the amplitude: a reference that is followed worse than this is lost
+DEAD_ZONE = "valve_dead_zone.half_width_v"
 MARGIN_M, LOWEST_PA, BELOW_SUPPLY_PA = 2e-3, 1.2e5, 5e3
 
 
@@ -33,12 +35,12 @@ class Metrics:
         Root of the mean squared error once tracking is judged.
     air_kg
         Taken from the supply.
-    activity_v
-        Sum of all changes of the command.
+    activity_v, switches
+        Sum of all changes of the command; how often the valve goes over from one side to the other.
     violation_s
         Time outside the limits of position and pressures.
-    amplitude_m
-        Of a reference that does not end at rest; NaN for one that does.
+    amplitude_m, way_m
+        Of a reference that does not end at rest, and of a step; NaN for the other one.
     solve_median_s, solve_p99_s
         Wall time of one controller step.
     """
@@ -54,11 +56,18 @@ class Metrics:
     rmse_m: float
     air_kg: float
     activity_v: float
+    switches: float
     violation_s: float
     solve_median_s: float
     solve_p99_s: float
     estimate_median_s: float
     amplitude_m: float = nan
+    way_m: float = nan
+
+    @property
+    def overshoot_share(self) -> float:
+        """Of the way."""
+        return self.overshoot_m / self.way_m
 
     @property
     def ends_at_rest(self) -> bool:
@@ -93,11 +102,13 @@ def measure(
         rmse_m=float(np.sqrt(np.mean(judged**2))),
         air_kg=air_used_kg(plant, record),
         activity_v=float(np.abs(np.diff(command)).sum()),
+        switches=valve_switches(plant, command[0]),
         violation_s=_violation_s(plant, record),
         solve_median_s=float(np.median(record.control_time_s)),
         solve_p99_s=float(np.percentile(record.control_time_s, 99)),
         estimate_median_s=float(np.median(record.estimate_time_s)),
         amplitude_m=nan if scenario.ends_at_rest else float(np.ptp(wanted) / 2.0),
+        way_m=float(np.ptp(wanted)) if scenario.ends_at_rest else nan,
     )
 
 
@@ -112,16 +123,31 @@ def _step_metrics(position: np.ndarray, wanted: np.ndarray, scenario: Scenario) 
     share, error = (position - wanted[0]) / size, position - wanted
     outside = np.flatnonzero(np.abs(error) > SETTLED_M)
     settled = outside[-1] + 1 if len(outside) else begins
-    rose = share.max() > 0.9
     return {
-        "rise_s": float(np.argmax(share > 0.9) - np.argmax(share > 0.1)) * SAMPLE_TIME_S
-        if rose
-        else np.nan,
+        "rise_s": rise_s(share, SAMPLE_TIME_S),
         "overshoot_m": float(max(share.max() - 1.0, 0.0) * abs(size)),
         "settling_s": (settled - begins) * SAMPLE_TIME_S if settled < len(error) else inf,
         "final_error_m": float(np.abs(error[-late:]).max()),
         "limit_cycle_m": float(np.ptp(position[-late:])),
     }
+
+
+def rise_s(share: np.ndarray, sample_time_s: float) -> float:
+    """From 10 to 90 % of the way, ``share`` of it by sample, shape (n,); NaN if never there."""
+    if not share.max() > 0.9:
+        return nan
+    return float(np.argmax(share > 0.9) - np.argmax(share > 0.1)) * sample_time_s
+
+
+def valve_switches(plant: Plant, command_v: np.ndarray) -> float:
+    """How often a proportional valve goes over from one side to the other, its dead zone between.
+
+    A command within the dead zone opens neither side, and counts as none; ``command_v`` is (n,).
+    """
+    opening_v = command_v - closed_command(plant)
+    half_v = plant.values.get(DEAD_ZONE, 0.0)
+    sides = np.sign(opening_v[np.abs(opening_v) > half_v])
+    return float(np.count_nonzero(np.diff(sides)))
 
 
 def air_used_kg(plant: Plant, record: LoopRecord, sample_time_s: float = SAMPLE_TIME_S) -> float:
@@ -156,6 +182,7 @@ COLUMNS = {
     "rmse_m": ("RMSE mm", 1e3),
     "air_kg": ("air g", 1e3),
     "activity_v": ("moves V", 1.0),
+    "switches": ("switches", 1.0),
     "violation_s": ("limits ms", 1e3),
     "solve_median_s": ("ctrl us", 1e6),
     "solve_p99_s": ("p99 us", 1e6),

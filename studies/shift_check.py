@@ -27,7 +27,7 @@ from workbench.filtering import consistent_start
 from workbench.plant import Plant
 from workbench.plants.gearbox import FINGER_M, FLOATING, MAIN
 
-SAMPLE_TIME_S, LASTS_S = 2.5e-4, 0.08
+SAMPLE_TIME_S, LASTS_S, LATE_S = 2.5e-4, 0.08, 0.01
 SETTLED_M, OVERSHOT_M = 0.3e-3, 0.5e-3
 SLOWER, SOFTER, SOFT_M_S = 1.25, 0.5, 0.5
 NOISE = {**dict.fromkeys(PRESSURES, 1e3), POSITION: 2e-5}
@@ -60,24 +60,35 @@ class Drive:
 class Shift:
     """One shift in closed loop; times from the first sample.
 
+    rise_s              from 10 to 90 % of the way
     settling_s          until the piston stays within 0.3 mm of its place
     impact_m_s          largest speed with which two parts meet: pistons, stops, shoulder
     overshoot_m         past Neutral; 0 for a shift to an end
+    final_error_m       largest error over the last 10 ms
+    way_m               from start to target
     air_kg, switches    taken from the supply, and how often the valves switch
     longest_s, hardest_m_s    what the open loop allows on this plant
     """
 
     design: str
     scenario: str
+    rise_s: float
     settling_s: float
     impact_m_s: float
     overshoot_m: float
+    final_error_m: float
+    way_m: float
     air_kg: float
     switches: float
     longest_s: float
     hardest_m_s: float
     solve_median_s: float
     solve_p99_s: float
+
+    @property
+    def overshoot_share(self) -> float:
+        """Of the way."""
+        return self.overshoot_m / self.way_m
 
     @property
     def reached(self) -> bool:
@@ -172,7 +183,7 @@ def run(
 
 def _measured(plant: Plant, record: LoopRecord, scenario: str) -> Shift:
     """What one run shows; its bounds are infinite."""
-    from studies.closed_loop_metrics import air_used_kg
+    from studies.closed_loop_metrics import air_used_kg, rise_s
 
     recording, (start, target) = record.recording, SHIFTS[scenario]
     end_m = half_stroke_m(plant)
@@ -181,12 +192,16 @@ def _measured(plant: Plant, record: LoopRecord, scenario: str) -> Shift:
     settled = outside[-1] + 1 if len(outside) else 0
     past = np.sign(target - start) * gone if target == 0.0 else np.zeros(1)
     commands = recording.rows(plant.model.commands)
+    way = (target - start) * end_m
     return Shift(
         design="open loop",
         scenario=scenario,
+        rise_s=rise_s(1.0 + gone / way, SAMPLE_TIME_S),
         settling_s=settled * SAMPLE_TIME_S if settled < len(gone) else np.inf,
         impact_m_s=impact_m_s(record, end_m),
         overshoot_m=float(max(past.max(), 0.0)),
+        final_error_m=float(np.abs(gone[-round(LATE_S / SAMPLE_TIME_S) :]).max()),
+        way_m=abs(way),
         air_kg=air_used_kg(plant, record, SAMPLE_TIME_S),
         switches=float(np.abs(np.diff(commands, prepend=0.0)).sum()),
         longest_s=np.inf,

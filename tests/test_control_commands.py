@@ -36,7 +36,7 @@ def place(tmp_path_factory):
 def row(scenario, error_m, cycle_m, rmse_m, amplitude_m):
     """Metrics of a run with these errors."""
     rest = dict.fromkeys(
-        ("rise_s", "overshoot_m", "settling_s", "air_kg", "activity_v", "violation_s",
+        ("rise_s", "overshoot_m", "settling_s", "air_kg", "activity_v", "switches", "violation_s",
          "solve_median_s", "solve_p99_s", "estimate_median_s"), 0.0,
     )  # fmt: skip
     errors = {"final_error_m": error_m, "limit_cycle_m": cycle_m, "rmse_m": rmse_m}
@@ -79,12 +79,15 @@ def test_a_design_for_another_plant_is_refused(place, monkeypatch):
 @pytest.mark.parametrize(
     ("spec", "said"),
     [
-        ("positioning = 3", "mpc.positioning is 3; expected a table of some of approach_m"),
-        ("horizon = 0", "mpc.horizon is 0; expected a whole number from 1 to 500"),
-        ("horizon = 2.5", "mpc.horizon is 2.5; expected a whole number"),
-        ("opening_v = nan", "mpc.opening_v is nan; expected a number above 0"),
-        ("sample_time_s = -1", "mpc.sample_time_s is -1; expected a number above 0"),
-        ("[positioning]\nstribeck_share = 2", "expected a number from 0 to 1"),
+        (
+            "positioning = 3",
+            "spec.toml:2: mpc.positioning: 3 is no table; expected a table of some",
+        ),
+        ("horizon = 0", "spec.toml:2: mpc.horizon: is 0; expected a whole number from 1 to 500"),
+        ("horizon = 2.5", "mpc.horizon: is 2.5; expected a whole number"),
+        ("opening_v = nan", "mpc.opening_v: is nan; expected a number above 0"),
+        ("sample_time_s = -1", "mpc.sample_time_s: is -1; expected a number above 0"),
+        ("[mpc.positioning]\nstribeck_share = 2", "expected a number from 0 to 1"),
         ("positon_m = 1", "did you mean 'position_m'?"),
         ("band_m = 1e-4", "did you mean 'positioning.band_m'?"),
         ("below_supply_pa = 6e5", "leave no room on servo_drive"),
@@ -92,7 +95,7 @@ def test_a_design_for_another_plant_is_refused(place, monkeypatch):
 )
 def test_a_number_that_makes_no_sense_is_named_with_what_was_expected(place, tmp_path, spec, said):
     path = tmp_path / "spec.toml"
-    path.write_text(spec + "\n")
+    path.write_text(f"[mpc]\n{spec}\n")
 
     answer = call(
         "design", place / "servo_drive.toml", "--controller", "mpc", "--spec", path,

@@ -1,4 +1,4 @@
-"""The text of a rig file: its TOML tree, the line of every key, and what is wrong with it."""
+"""The text of a file that a user writes: its TOML tree, the line of every key, what is wrong."""
 
 from __future__ import annotations
 
@@ -16,13 +16,14 @@ _QUOTED = re.compile(r""""(?:[^"\\]|\\.)*"|'[^']*'""")
 
 
 class RigText:
-    """A rig file while it is read: complaints are collected here, and raised all at once.
+    """A file while it is read: complaints are collected here, and raised all at once.
 
     ``tree`` is what TOML says.  Every place in it is a tuple of keys, ``("values", "slide.mass")``.
+    ``kind`` is what the messages call the file.
     """
 
-    def __init__(self, text: str, file: str) -> None:
-        self.text, self.file = text, file
+    def __init__(self, text: str, file: str, kind: str = "a rig file") -> None:
+        self.text, self.file, self.kind = text, file, kind
         self.messages: list[Message] = []
         self._lines = key_lines(text)
         try:
@@ -56,7 +57,7 @@ class RigText:
     def keys_among(self, place: tuple[str, ...], table: Mapping[str, Any], known: Iterable[str]):
         """Note every key of the table at ``place`` that is not known."""
         known = list(known)
-        owner = f"[{'.'.join(place)}]" if place else "a rig file"
+        owner = f"[{'.'.join(place)}]" if place else self.kind
         for key in table:
             if key not in known:
                 self.unknown((*place, key), owner, known)

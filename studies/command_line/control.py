@@ -1,6 +1,6 @@
 """Commands on modes and closed loops: modes, design, check."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -23,10 +23,18 @@ from studies.command_line.files import read_all, writable, write_json
 
 if TYPE_CHECKING:
     from controllers.design_file import Design
+    from studies.closed_loop_check import Check
+    from studies.shift_check import ShiftCheck
+    from studies.specification import Specification
+    from studies.verdicts import Judged
+    from workbench.rig import Rig
 
 DesignFile = Annotated[Path, typer.Argument(metavar="DESIGN", help="What `design` wrote.")]
 Several = Annotated[int, typer.Option("--runs", metavar="N", min=1, help="Plants to draw.")]
-CHECK = "workbench check rig.toml lq.toml --estimator mhe --scenario step --figures figures"
+Spec = Annotated[
+    Path | None, typer.Option("--spec", metavar="SPEC.toml", help="What the loop is asked for.")
+]
+CHECK = "workbench check rig.toml lq.toml --estimator mhe --scenario step --spec spec.toml"
 
 
 @app.command(cls=Spread, epilog=example("workbench modes rig.toml --export modes"))
@@ -92,21 +100,23 @@ def design(
         typer.Option("--controller", metavar="METHOD", help="pid, lq, mpc, cascade; hybrid-mpc."),
     ],
     output: Output,
-    spec: Annotated[
-        Path | None, typer.Option("--spec", metavar="SPEC.toml", help="Numbers of the design.")
-    ] = None,
+    spec: Spec = None,
     quiet: Quiet = False,
 ) -> None:
-    """One design per mode, written as a file that `check` reads."""
+    """One design per mode, written as a file that `check` reads.
+
+    A specification gives the design its numbers and limits, and a verdict per line on the rig.
+    """
     with answering(quiet) as say:
         from controllers.design_file import design as design_controller
         from controllers.design_file import gains, write_design
-        from studies.catalogue_text import read_toml
+        from studies.specification import design_numbers, read_specification
         from workbench.rig import load_rig
 
         writable(output)
         known = load_rig(rig)
-        numbers = read_toml(spec) if spec else {}
+        asked = read_specification(spec, known) if spec else None
+        numbers = design_numbers(asked, controller, known.plant) if asked else {}
         say(f"designing {controller}")
         found = design_controller(controller, known.plant, numbers)
         write_design(found, output)
@@ -119,6 +129,31 @@ def design(
         else:
             _certify(found, say)
         typer.echo(f"wrote {output}")
+        if asked and asked.asked:
+            from studies.verdicts import judge
+
+            checked = _closed_loop(known, output, (), (), 1, say)
+            typer.echo(judge(asked, known, checked, (known.plant,)).text)
+
+
+def _closed_loop(
+    rig: "Rig",
+    design: Path,
+    estimators: Iterable[str],
+    scenarios: Iterable[str],
+    runs: int,
+    say: Callable[[str], None],
+) -> "Check | ShiftCheck":
+    """A design in the scenarios of its plant; a gearbox brings its own estimator."""
+    from studies.checking import check_gears, check_rig, shifts_gears
+    from workbench.errors import InputError, Message
+
+    if not shifts_gears(rig):
+        return check_rig(rig, [design], estimators or ["ekf"], scenarios, runs, say)
+    if estimators:
+        what = f"{rig.name} has an estimator of its own: leave --estimator out"
+        raise InputError(Message(what))
+    return check_gears(rig, [design], scenarios, runs, say)
 
 
 def _certify(found: "Design", say: Callable[[str], None]) -> None:
@@ -149,11 +184,15 @@ def check(
         typer.Option("--scenario", metavar="NAME", help="step, sine; n-h, h-n, n-l, l-n; all."),
     ] = None,
     runs: Several = 1,
+    spec: Spec = None,
     figures: Figures = None,
     json: Json = None,
     quiet: Quiet = False,
 ) -> None:
     """Closed loop against the full nonlinear plant; exit code 1 where the goal is missed.
+
+    The goal is the specification, where one is given: a verdict per line, and with --runs the
+    share of plants that meet it and the worst one.
 
     A gearbox is judged by its four shifts, each beside the open loop on the same plant.
 
@@ -161,21 +200,16 @@ def check(
     keeps the rig's own values.
     """
     with answering(quiet) as say:
-        from studies.checking import check_gears, check_rig, shifts_gears
         from studies.documents import check_document
-        from workbench.errors import InputError, Message
         from workbench.rig import load_rig
 
         writable(json, folders=[figures])
         known = load_rig(rig)
-        if shifts_gears(known):
-            if estimator:
-                what = f"{known.name} has an estimator of its own: leave --estimator out"
-                raise InputError(Message(what))
-            found = check_gears(known, [design], scenario or (), runs, say)
-        else:
-            found = check_rig(known, [design], estimator or ["ekf"], scenario or (), runs, say)
-        write_json(json, check_document(known.name, found))
+        asked = _asked(spec, known, scenario or ()) if spec else None
+        found = _closed_loop(known, design, estimator or (), scenario or (), runs, say)
+        judged = _judged(asked, known, found, runs) if asked else None
+        document = check_document(known.name, found) | (judged.document if judged else {})
+        write_json(json, document)
         if figures:
             from studies.checking import styled_figures
             from studies.figures.style import save_all
@@ -183,6 +217,30 @@ def check(
             save_all(styled_figures(found), figures, command_text())
             say(f"figures in {figures}")
         typer.echo(found.text)
-        if any(row.reached is False for row in found.rows):
+        if judged:
+            typer.echo("\n" + judged.text)
+            if not judged.met:
+                typer.echo(f"out of specification: {', '.join(judged.missed)}", err=True)
+                raise typer.Exit(NO)
+        elif any(row.reached is False for row in found.rows):
             typer.echo(found.goal, err=True)
             raise typer.Exit(NO)
+
+
+def _asked(spec: Path, rig: "Rig", scenarios: Iterable[str]) -> "Specification":
+    """What a specification asks for in these scenarios; one without a line asks for nothing."""
+    from studies.specification import read_specification
+    from workbench.errors import InputError, Message
+
+    found = read_specification(spec, rig, scenarios)
+    if not found.asked:
+        expected = 'a line such as rise_time = "150 ms"'
+        raise InputError(Message("asks for nothing", expected=expected, file=str(spec)))
+    return found
+
+
+def _judged(asked: "Specification", rig: "Rig", found: "Check | ShiftCheck", runs: int) -> "Judged":
+    from studies.checking import drawn_plants
+    from studies.verdicts import judge
+
+    return judge(asked, rig, found, drawn_plants(rig, runs))

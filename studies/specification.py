@@ -1,0 +1,270 @@
+"""SPEC.toml: what a closed loop is asked for, line by line, and numbers of the designs for it.
+
+Lines stand at the top with their unit (``rise_time = "150 ms"``), limits of states in ``[limits]``
+(``"slide.velocity" = "1 m/s"``, or from and to as a list), and numbers of a controller in a table
+of its name (``[mpc]``), in SI as in a design file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from math import inf, isfinite
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from controllers import CONTROLLERS
+from controllers.spec import replaced
+from linearize.axes import stroke_m
+from linearize.standard import POSITION, PRESSURES, SHIFT_MODES, SLIDE_MODES, SUPPLY
+from studies.scenarios import SCENARIOS
+from studies.shift_check import SHIFTS
+from studies.text import number
+from workbench.closed_loop import LoopRecord
+from workbench.errors import InputError, Message, listed
+from workbench.plant import Plant
+from workbench.rig import Rig
+from workbench.rig_text import RigText, read_text
+from workbench.units import Scale, UnitError, public_name, quantity, scale, split
+
+LIMITS = "limits"
+OVERSHOOT = "overshoot"
+PERCENT = ("%", "percent")
+
+SLIDE_LINES = {
+    "rise_time": "rise_s",
+    "settling_time": "settling_s",
+    OVERSHOOT: "overshoot_m",
+    "final_error": "final_error_m",
+    "limit_cycle": "limit_cycle_m",
+    "tracking_error": "rmse_m",
+    "air": "air_kg",
+    "switches": "switches",
+}
+"""Field of :class:`studies.closed_loop_metrics.Metrics` by the line that asks for it."""
+
+SHIFT_LINES = {
+    "rise_time": "rise_s",
+    "settling_time": "settling_s",
+    OVERSHOOT: "overshoot_m",
+    "final_error": "final_error_m",
+    "impact_speed": "impact_m_s",
+    "air": "air_kg",
+    "switches": "switches",
+}
+"""Likewise of :class:`studies.shift_check.Shift`."""
+
+EVERYWHERE = ("air_kg", "switches")  # all else asks for an end at rest, or for none
+MOVING = ("rmse_m",)
+
+
+@dataclass(frozen=True)
+class Asked:
+    """One line of a specification: from where to where a figure of a run may lie, in SI.
+
+    name          as the file has it
+    figure        the full name of the figure, which ends in its unit
+    scenarios     those that the line is judged in
+    unit, scale   as typed, to show what was found likewise
+    """
+
+    name: str
+    figure: str
+    least: float
+    most: float
+    scenarios: tuple[str, ...]
+    unit: str
+    scale: Scale
+
+    def found(self, row: Any, record: LoopRecord) -> float:
+        """The figure of a run; NaN where it has none, as the rise of a step that never rose."""
+        return getattr(row, self.figure)
+
+    def excess(self, found: float) -> float:
+        """How far beyond what is asked: at most 0 where it is met; infinite without a figure."""
+        return max(self.least - found, found - self.most) if isfinite(found) else inf
+
+    @property
+    def text(self) -> str:
+        """What is asked for, in words."""
+        if self.least in (-inf, -self.most):
+            return f"at most {self.shown(self.most)}"
+        return f"{self.shown(self.least)} to {self.shown(self.most)}"
+
+    def shown(self, value: float) -> str:
+        """A value of the figure in the unit that was typed."""
+        return f"{number(self.scale.from_si(value))} {self.unit}".strip()
+
+
+@dataclass(frozen=True)
+class Limit(Asked):
+    """A line on a state, of which no sample of a run may lie outside."""
+
+    def found(self, row: Any, record: LoopRecord) -> float:
+        """The extreme of the state that goes farthest beyond, or comes nearest to it."""
+        ends = [float(end(record.recording[self.figure])) for end in (np.min, np.max)]
+        return max(ends, key=self.excess)
+
+
+@dataclass(frozen=True)
+class Specification:
+    """All lines of a file, and numbers of designs by the controller's name."""
+
+    asked: tuple[Asked, ...]
+    numbers: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+
+
+def read_specification(
+    path_or_text: Path | str, rig: Rig, scenarios: Iterable[str] = ()
+) -> Specification:
+    """The specification of a file, or of its text, for a rig that ``check`` knows.
+
+    Parameters
+    ----------
+    scenarios
+        Those of the check, in which every line must have something to judge; all by default.
+
+    Raises
+    ------
+    InputError
+        With everything that is wrong in the file, sorted by line; or if the plant has no standard
+        modes to control.
+    """
+    lines, judged = _known(rig.plant)
+    chosen = tuple(scenarios) or tuple(judged)
+    content, path = read_text(path_or_text)
+    text = RigText(content, str(path) if path else "spec", "a specification")
+    _top_keys(text, lines)
+    asked = [*_figures(text, rig, lines, judged), *_limits(text, rig, tuple(judged))]
+    for line in asked:
+        if not set(chosen) & set(line.scenarios):
+            what, expected = f"is not judged in {listed(chosen)}", f"among {listed(line.scenarios)}"
+            text.wrong(tuple(line.name.split(".", 1)), what, expected=f"a scenario {expected}")
+    numbers = {name: _numbers(text, name) for name in CONTROLLERS if name in text.tree}
+    text.finish()
+    return Specification(tuple(asked), numbers)
+
+
+def design_numbers(spec: Specification, method: str, plant: Plant) -> dict[str, Any]:
+    """Numbers of a design: those of its table, and for an MPC its limits where the table has none.
+
+    The MPC keeps one margin to both ends and one pair of limits for both pressures: the tightest.
+    """
+    own = dict(spec.numbers.get(method, {}))
+    if method != "mpc":
+        return own
+    numbers: dict[str, float] = {}
+    limits = {each.figure: each for each in spec.asked if isinstance(each, Limit)}
+    if POSITION in limits:
+        place = limits[POSITION]
+        numbers["margin_m"] = max(place.least, stroke_m(plant) - place.most, 0.0)
+    pressures = [limits[name] for name in PRESSURES if name in limits]
+    if pressures:
+        highest_pa = min(each.most for each in pressures)
+        numbers["below_supply_pa"] = max(float(plant.values[SUPPLY]) - highest_pa, 0.0)
+        if (lowest_pa := max(each.least for each in pressures)) > 0.0:
+            numbers["lowest_pa"] = lowest_pa
+    return numbers | own
+
+
+def _known(plant: Plant) -> tuple[Mapping[str, str], dict[str, bool]]:
+    """The figure of each line, and whether each scenario ends at rest."""
+    if plant.name in SHIFT_MODES:
+        return SHIFT_LINES, dict.fromkeys(SHIFTS, True)
+    if plant.name in SLIDE_MODES:
+        stroke = stroke_m(plant)
+        return SLIDE_LINES, {name: make(stroke).ends_at_rest for name, make in SCENARIOS.items()}
+    expected = f"a rig of {listed((*SLIDE_MODES, *SHIFT_MODES))}"
+    raise InputError(Message(f"{plant.name} has no standard modes to control", expected=expected))
+
+
+def _top_keys(text: RigText, lines: Mapping[str, str]) -> None:
+    known = (*lines, LIMITS, *CONTROLLERS)
+    deeper = [
+        f"{name}.{number}" for name, found in CONTROLLERS.items() for number in _names(found.spec())
+    ]
+    expected = f"one of {listed(known, len(known))}"
+    for key in text.tree:
+        if key not in known:
+            what = f"{text.kind} has no such name"
+            text.wrong((key,), what, expected=expected, known=(*known, *deeper))
+
+
+def _names(spec: Any, before: str = "") -> Iterator[str]:
+    """The numbers of a design by their dotted name, without the controller's."""
+    for each in fields(spec):
+        value = getattr(spec, each.name)
+        if is_dataclass(value):
+            yield from _names(value, f"{before}{each.name}.")
+        else:
+            yield before + each.name
+
+
+def _figures(
+    text: RigText, rig: Rig, lines: Mapping[str, str], judged: Mapping[str, bool]
+) -> Iterator[Asked]:
+    for name in text.tree:
+        if name not in lines:
+            continue
+        figure, typed = lines[name], text.tree[name]
+        at_rest = figure not in MOVING
+        scenarios = [s for s, rests in judged.items() if figure in EVERYWHERE or rests == at_rest]
+        if name == OVERSHOOT and str(typed).rstrip().endswith(PERCENT):
+            figure = "overshoot_share"
+        if found := _quantity(text, (name,), rig, figure, typed):
+            most, unit, shown_in = found
+            if most < 0.0 or (figure == "switches" and most != round(most)):
+                whole = "a whole number" if figure == "switches" else "a quantity"
+                text.wrong((name,), f"is {typed}", expected=f"{whole} from 0")
+            yield Asked(name, figure, -inf, most, tuple(scenarios), unit, shown_in)
+
+
+def _limits(text: RigText, rig: Rig, scenarios: tuple[str, ...]) -> Iterator[Asked]:
+    known = {public_name(name): name for name in rig.plant.lean().model.states}
+    for name, typed in text.flat(LIMITS).items():
+        place = (LIMITS, name)
+        if name not in known:
+            text.unknown(place, rig.plant.name, known)
+            continue
+        pair = typed if isinstance(typed, list) else [typed]
+        if isinstance(typed, list) and len(pair) != 2:
+            text.wrong(place, f"is {typed}", expected="one limit, or a list of from and to")
+            continue
+        ends = [_quantity(text, place, rig, known[name], each) for each in pair]
+        if None in ends:
+            continue
+        most, unit, shown_in = ends[-1]
+        least = ends[0][0] if len(pair) == 2 else -most
+        if least >= most:
+            expected = "from and to, the lower one first" if len(pair) == 2 else "more than 0"
+            text.wrong(place, f"is {typed}", expected=expected)
+        yield Limit(f"{LIMITS}.{name}", known[name], least, most, scenarios, unit, shown_in)
+
+
+def _quantity(
+    text: RigText, place: tuple[str, ...], rig: Rig, name: str, typed: Any
+) -> tuple[float, str, Scale] | None:
+    """A quantity in SI, the unit it was typed in, and that unit's scale; complaints to ``text``."""
+    try:
+        value, unit = quantity(typed, name, rig.ambient_pa), split(typed, name)[1]
+    except UnitError as error:
+        share = " or %" if place == (OVERSHOOT,) else ""
+        text.wrong(place, str(error) + share)
+        return None
+    if not isfinite(value):
+        text.wrong(place, f"is {typed}", expected="a finite quantity")
+        return None
+    return value, unit, scale(unit, name, rig.ambient_pa) if unit else Scale()
+
+
+def _numbers(text: RigText, method: str) -> Mapping[str, Any]:
+    """Numbers of a design, with the complaints of its specification placed in the file."""
+    try:
+        replaced(CONTROLLERS[method].spec(), text.tree[method], method)
+    except InputError as error:
+        for each in error.messages:
+            line = text.line(tuple(each.name.split(".")))
+            text.messages.append(replace(each, file=text.file, line=line))
+    return text.tree[method]
