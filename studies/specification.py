@@ -24,7 +24,7 @@ from studies.shift_check import SHIFTS
 from studies.text import number
 from workbench.closed_loop import LoopRecord
 from workbench.errors import InputError, Message, listed
-from workbench.plant import Plant
+from workbench.plant import Plant, require
 from workbench.rig import Rig
 from workbench.rig_text import RigText, read_text
 from workbench.units import Scale, UnitError, public_name, quantity, scale, split
@@ -129,11 +129,12 @@ def read_specification(
     Raises
     ------
     InputError
-        With everything that is wrong in the file, sorted by line; or if the plant has no standard
-        modes to control.
+        With everything that is wrong in the file, sorted by line; or if a scenario does not exist,
+        or the plant has no standard modes to control.
     """
     lines, judged = _known(rig.plant)
     chosen = tuple(scenarios) or tuple(judged)
+    require(chosen, judged, "the list of scenarios")
     content, path = read_text(path_or_text)
     text = RigText(content, str(path) if path else "spec", "a specification")
     _top_keys(text, lines)

@@ -11,7 +11,7 @@ from controllers.condensed import MpcSpec, limits_of
 from linearize.axes import stroke_m
 from studies.checking import differences
 from studies.closed_loop_check import Check
-from studies.closed_loop_metrics import LOST_SHARE, Metrics, table
+from studies.closed_loop_metrics import LOST_SHARE, Metrics, rise_s, table, valve_switches
 from studies.documents import check_document
 from workbench.plants import PLANTS
 from workbench.recording import Recording
@@ -184,3 +184,18 @@ def test_time_outside_the_limits_is_counted_against_the_own_supply():
 
     assert _violation_s(PLANT, record) == 0.0
     assert _violation_s(PLANT.with_values({"supply.pressure_pa": 6e5}), record) == n * 1e-3
+
+
+def test_a_proportional_valve_switches_when_it_goes_over_its_dead_zone():
+    centre = 4.95
+    beyond = np.array([0.0, 0.3, 0.5, 0.4, 0.5, -0.4, -0.5, 0.0, -0.6, 0.6])
+
+    assert valve_switches(PLANT, centre + beyond) == 2.0
+    assert valve_switches(PLANT, np.full(5, centre)) == 0.0
+
+
+def test_a_rise_is_from_a_tenth_to_nine_tenths_and_nothing_where_it_never_gets_there():
+    share = np.linspace(0.0, 1.0, 1001)
+
+    assert rise_s(share, 1e-3) == pytest.approx(0.8, abs=1.5e-3)
+    assert np.isnan(rise_s(0.85 * share, 1e-3))

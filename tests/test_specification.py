@@ -13,7 +13,6 @@ from controllers.condensed import MpcSpec
 from linearize.axes import stroke_m
 from studies.checking import drawn_plants
 from studies.closed_loop_check import Check
-from studies.closed_loop_metrics import rise_s, valve_switches
 from studies.scenarios import SCENARIOS
 from studies.shift_check import SHIFTS, ShiftCheck
 from studies.specification import (
@@ -160,6 +159,12 @@ def test_a_line_that_no_chosen_scenario_judges_is_refused():
     assert line == "spec:2: rise_time: is not judged in sine; expected a scenario among step"
 
 
+def test_an_unknown_scenario_is_named_with_the_nearest():
+    (line,) = said('air = "1 g"', scenarios=["sinus"])
+
+    assert "sinus" in line and "sine" in line
+
+
 BAD = """\
 rise_tme = "150 ms"
 overshoot = "2 V"
@@ -281,18 +286,3 @@ def test_a_relative_uncertainty_of_a_rig_counts_in_its_own_deviations():
     assert drawn_values(rig, heavy) == {
         "slide.mass_kg": (heavy.values["slide.mass_kg"], pytest.approx(1.0))
     }
-
-
-def test_a_proportional_valve_switches_when_it_goes_over_its_dead_zone():
-    centre = 4.95
-    beyond = np.array([0.0, 0.3, 0.5, 0.4, 0.5, -0.4, -0.5, 0.0, -0.6, 0.6])
-
-    assert valve_switches(DRIVE.plant, centre + beyond) == 2.0
-    assert valve_switches(DRIVE.plant, np.full(5, centre)) == 0.0
-
-
-def test_a_rise_is_from_a_tenth_to_nine_tenths_and_nothing_where_it_never_gets_there():
-    share = np.linspace(0.0, 1.0, 1001)
-
-    assert rise_s(share, 1e-3) == pytest.approx(0.8, abs=1.5e-3)
-    assert np.isnan(rise_s(0.85 * share, 1e-3))

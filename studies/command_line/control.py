@@ -133,7 +133,9 @@ def design(
             from studies.verdicts import judge
 
             checked = _closed_loop(known, output, (), (), 1, say)
-            typer.echo(judge(asked, known, checked, (known.plant,)).text)
+            judged = judge(asked, known, checked, (known.plant,))
+            typer.echo("\n" + judged.text)
+            _tell_missed(judged)
 
 
 def _closed_loop(
@@ -219,8 +221,8 @@ def check(
         typer.echo(found.text)
         if judged:
             typer.echo("\n" + judged.text)
+            _tell_missed(judged)
             if not judged.met:
-                typer.echo(f"out of specification: {', '.join(judged.missed)}", err=True)
                 raise typer.Exit(NO)
         elif any(row.reached is False for row in found.rows):
             typer.echo(found.goal, err=True)
@@ -237,6 +239,11 @@ def _asked(spec: Path, rig: "Rig", scenarios: Iterable[str]) -> "Specification":
         expected = 'a line such as rise_time = "150 ms"'
         raise InputError(Message("asks for nothing", expected=expected, file=str(spec)))
     return found
+
+
+def _tell_missed(judged: "Judged") -> None:
+    if not judged.met:
+        typer.echo(f"out of specification: {', '.join(judged.missed)}", err=True)
 
 
 def _judged(asked: "Specification", rig: "Rig", found: "Check | ShiftCheck", runs: int) -> "Judged":
