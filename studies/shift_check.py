@@ -197,7 +197,7 @@ def _measured(plant: Plant, record: LoopRecord, scenario: str) -> Shift:
         design="open loop",
         scenario=scenario,
         rise_s=rise_s(1.0 + gone / way, SAMPLE_TIME_S),
-        settling_s=settled * SAMPLE_TIME_S if settled < len(gone) else np.inf,
+        settling_s=float(settled * SAMPLE_TIME_S) if settled < len(gone) else np.inf,
         impact_m_s=impact_m_s(record, end_m),
         overshoot_m=float(max(past.max(), 0.0)),
         final_error_m=float(np.abs(gone[-round(LATE_S / SAMPLE_TIME_S) :]).max()),

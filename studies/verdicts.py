@@ -31,7 +31,7 @@ class Verdict:
     @property
     def met(self) -> tuple[bool, ...]:
         """Whether each run meets the line."""
-        return tuple(self.asked.excess(value) <= 0.0 for value in self.found)
+        return tuple(bool(self.asked.excess(value) <= 0.0) for value in self.found)
 
     @property
     def share_met(self) -> float:

@@ -1,6 +1,7 @@
 """`design --spec` and `check --spec`: the same verdicts in table, JSON and exit code."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -90,6 +91,21 @@ def test_the_shifts_of_a_gearbox_are_held_against_a_specification(place):
     assert entries["switches"]["found"] == run["switches"]
     assert entries["final_error"]["found"] == run["final_error_m"]
     assert answer.exit_code == 1 and "out of specification: switches" in answer.stderr
+
+
+def test_a_shift_that_takes_too_long_is_a_no_in_the_document_too():
+    """Half of the time that the open loop takes is too short for it."""
+    from studies.documents import check_document
+    from studies.shift_check import Drive, ShiftCheck, _measured, run, shift_filter
+    from workbench.plants.gearbox import gearbox
+
+    plant = gearbox().lean()
+    shift = _measured(plant, run(plant, Drive((1, 1)), shift_filter(plant, 1e-3), "h-n", 0), "h-n")
+    late = replace(shift, longest_s=0.5 * shift.settling_s)
+
+    assert late.reached is False
+    (entry,) = json.loads(json.dumps(check_document("box", ShiftCheck((late,), ()))))["runs"]
+    assert entry["reached"] is False
 
 
 @pytest.mark.parametrize(
