@@ -128,7 +128,7 @@ class LinearMpc:
         friction_n = self.force_n_m_s * integral
         place_m = before.place_m if before else now.x[0]
         program = self.programs.heaviest(place_m, now.ahead)
-        program, unforced = self._predicted(program, now, friction_n, before)
+        program, unforced = self._predicted(program, now, friction_n - now.rise_n, before)
         targets = self._targets(now, reference, program.horizon, friction_n)
         g = program.gradient(unforced, targets, now.opening_v, last_v)
         low, high = program.bounds(unforced, last_v)
@@ -146,7 +146,7 @@ class LinearMpc:
         self, program: Program, now: Task, force_n: float, before: Plan | None
     ) -> tuple[Program, np.ndarray]:
         """The program of the coming samples, and the stacked states under zero openings."""
-        return program, program.unforced(now.x, force_n - now.rise_n)
+        return program, program.unforced(now.x, force_n)
 
     def _targets(self, now: Task, reference: np.ndarray, n: int, friction_n: float) -> np.ndarray:
         """Stacked targets, shape (4 N,): the coming reference as far off as the approach allows."""
