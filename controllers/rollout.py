@@ -56,7 +56,7 @@ class Rollout:
         self, x: np.ndarray, openings: np.ndarray, d: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Stacked states (n_r N,) under openings (N,), and their sensitivities (n_r N, N)."""
-        told, slopes = self.ahead(x, openings, d)
+        told, slopes = self.ahead(*map(np.ascontiguousarray, (x, openings, d)))
         N, n = self.horizon, len(self.read)
         return told, slopes.reshape(N, N, n).transpose(0, 2, 1).reshape(n * N, N)
 
