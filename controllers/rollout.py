@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -59,6 +60,10 @@ class Rollout:
         told, slopes = self.ahead(*map(np.ascontiguousarray, (x, openings, d)))
         N, n = self.horizon, len(self.read)
         return told, slopes.reshape(N, N, n).transpose(0, 2, 1).reshape(n * N, N)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but the call in machine code, which another process makes again."""
+        return {key: value for key, value in self.__dict__.items() if key != "ahead"}
 
     @cached_property
     def ahead(self) -> Callable[..., list[np.ndarray]]:

@@ -1,5 +1,6 @@
 """Nonlinear MPC: its prediction, its program, and what it falls back on."""
 
+import pickle
 from dataclasses import fields, replace
 
 import casadi as ca
@@ -169,3 +170,16 @@ def test_a_late_answer_is_replaced_by_the_shifted_last_plan_and_told(controller)
 
     assert [c.notes["late"] for c in (first, late)] == [0.0, 1.0]
     assert late.notes["opening_v"] == first.memory.plan.openings[1]
+
+
+def test_it_gives_the_same_answer_twice_and_unpickled(controller):
+    reference, limited = held(controller, 0.25), seen([0.145, 0.3, 6.8e5, 1.3e5])
+    first = controller.step(controller.start(), reference, seen(REST))
+    found = [
+        each.step(first, reference, limited)
+        for each in (controller, controller, pickle.loads(pickle.dumps(controller)))
+    ]
+
+    assert found[0].notes["iterations"] > 0
+    for one in found[1:]:
+        assert np.array_equal(one.memory.plan.primal, found[0].memory.plan.primal)
