@@ -34,7 +34,8 @@ class NonlinearMpc(LinearMpc):
     ) -> tuple[Program, np.ndarray]:
         shifted = before.shifted().openings if before else np.full(program.horizon, now.opening_v)
         openings = np.clip(shifted, *program.openings)
-        return along(program, self.rollout, now.x, openings, [2.0 * now.ahead - 1.0, force_n])
+        side = 1.0 if now.ahead >= 0.5 else -1.0  # a share of friction would leave the slide stuck
+        return along(program, self.rollout, now.x, openings, [side, force_n])
 
 
 def along(

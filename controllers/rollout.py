@@ -57,9 +57,11 @@ class Rollout:
         self, x: np.ndarray, openings: np.ndarray, d: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Stacked states (n_r N,) under openings (N,), and their sensitivities (n_r N, N)."""
-        told, slopes = self.ahead(*map(np.ascontiguousarray, (x, openings, d)))
+        (told,) = self.ahead(*map(np.ascontiguousarray, (x, openings, d)))
         N, n = self.horizon, len(self.read)
-        return told, slopes.reshape(N, N, n).transpose(0, 2, 1).reshape(n * N, N)
+        by_sample = told.reshape(N, 1 + N, n)
+        slopes = by_sample[:, 1:].transpose(0, 2, 1).reshape(n * N, N)
+        return by_sample[:, 0].ravel(), slopes
 
     def __getstate__(self) -> dict[str, Any]:
         """All but the call in machine code, which another process makes again."""
@@ -67,29 +69,25 @@ class Rollout:
 
     @cached_property
     def ahead(self) -> Callable[..., list[np.ndarray]]:
-        """(x, openings, d) -> told states (n_r, N), and sensitivities (n_r, N N)."""
+        """(x, openings, d) -> state and sensitivities [x S] of all samples, (n_r, (1 + N) N)."""
         n, N = self.advance.numel_out(0), self.horizon
         x, u, d = (ca.MX.sym(k, self.advance.numel_in(i)) for i, k in enumerate("xud"))
-        S, chosen = ca.MX.sym("S", n, N), ca.MX.sym("chosen", 1, N)
-        later = self.advance(x, u, d)
-        F, G = self.slopes(x, u, d)
-        once = ca.Function("once", [x, S, u, chosen, d], [later, F @ S + G @ chosen])
-        told = ca.Function("told", [x, S], [x[self.read], S[self.read, :]])
-        openings, now, slopes = ca.MX.sym("openings", N), x, ca.MX(n, N)
-        rows = []
-        for i in range(N):
-            now, slopes = once(now, slopes, openings[i], ca.DM.eye(N)[i, :], d)
-            rows.append(told(now, slopes))
-        states, sensitivities = (ca.densify(ca.horzcat(*each)) for each in zip(*rows, strict=True))
-        run = ca.Function("rollout", [x, openings, d], [states, sensitivities])
+        both, chosen = ca.MX.sym("both", n, 1 + N), ca.MX.sym("chosen", N)
+        x_next, F, G = self.tangent(both[:, 0], u, d)
+        later = ca.horzcat(x_next, F @ both[:, 1:] + G @ chosen.T)
+        once = ca.Function("once", [both, u, chosen, d], [ca.densify(later)])
+        begun, openings = ca.horzcat(x, ca.MX.zeros(n, N)), ca.MX.sym("openings", N)
+        way = once.mapaccum(N)(begun, openings.T, ca.DM.eye(N), ca.repmat(d, 1, N))
+        run = ca.Function("rollout", [x, openings, d], [way[self.read, :]])
         return prepared(compiled(run))
 
     @cached_property
-    def slopes(self) -> ca.Function:
-        """(x, u, d) -> (F, G) of one sample."""
-        x, u, d = (ca.MX.sym(k, self.advance.numel_in(i)) for i, k in enumerate("xud"))
+    def tangent(self) -> ca.Function:
+        """(x, u, d) -> (x, F, G) one sample later; what they have in common is worked out once."""
+        x, u, d = (ca.SX.sym(k, self.advance.numel_in(i)) for i, k in enumerate("xud"))
         later = self.advance(x, u, d)
-        return ca.Function("slopes", [x, u, d], [ca.jacobian(later, s) for s in (x, u)])
+        slopes = [ca.densify(ca.jacobian(later, s)) for s in (x, u)]
+        return ca.Function("tangent", [x, u, d], ca.cse([later, *slopes]))
 
 
 def advance_of(
@@ -107,7 +105,7 @@ def advance_of(
 def sliding_advance(model: DesignModel, sample_time_s: float) -> ca.Function:
     """(x, opening, d) -> x one sample later on a design model with one axis; d is (s, force in N).
 
-    Dry friction acts against the direction s, from -1 to 1, in which the axis is to move: so the
+    Dry friction acts against the direction s, 1 or -1, in which the axis is to move: so the
     prediction has slopes where the plant has a kink, as the modes have.  What friction rises by
     near standstill is left to the force.
     """

@@ -135,13 +135,14 @@ def test_repeated_at_one_state_it_comes_to_the_optimum_of_the_nonlinear_problem(
 def test_it_settles_a_step_on_the_full_drive_without_a_limit_cycle():
     plant = servo_drive().lean()
     design = nonlinear_mpc(standard_modes(servo_drive()))
-    found = check(plant, {"nonlinear-mpc": design}, ["ekf"], ["step"])
+    for seed in (0, 1):
+        found = check(plant, {"nonlinear-mpc": design}, ["ekf"], ["step"], seed=seed)
 
-    row, notes = found.rows[0], found.records[0].notes
-    assert row.reached, row
-    assert row.overshoot_m < 2e-3 and row.rise_s < 0.1
-    assert row.violation_s < 5e-3
-    assert notes["fallback"][~np.isnan(notes["fallback"])].max() == 0.0
+        row, notes = found.rows[0], found.records[0].notes
+        assert row.reached, row
+        assert row.overshoot_m < 2e-3 and row.rise_s < 0.1
+        assert row.violation_s < 5e-3
+        assert np.nanmax(notes["fallback"]) == 0.0
 
 
 def test_a_prediction_that_is_not_finite_lets_the_last_plan_go_on(controller):
