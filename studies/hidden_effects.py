@@ -51,6 +51,14 @@ class Answer:
         return self.named.partition("@")[0] in bench_of(self.case).always_there
 
     @property
+    def ties_a_difference(self) -> bool:
+        """Whether one of these stands in the printed tie, behind another leader."""
+        if self.diagnosis.verdict is not Verdict.TIE:
+            return False
+        tied = (name.partition("@")[0] for name in self.diagnosis.ranking[0].tied_with)
+        return any(name in bench_of(self.case).always_there for name in tied)
+
+    @property
     def right(self) -> bool:
         """Whether the answer passes: see the module."""
         verdict = self.diagnosis.verdict
@@ -58,7 +66,7 @@ class Answer:
             if verdict is Verdict.NOT_IN_CATALOGUE:
                 return False
             names = verdict in (Verdict.FOUND, Verdict.TIE)
-            return not names or self.names_a_difference
+            return not names or self.names_a_difference or self.ties_a_difference
         if not self.in_catalogue:
             return verdict is Verdict.NOT_IN_CATALOGUE
         return self.tied

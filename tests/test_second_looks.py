@@ -9,7 +9,7 @@ from test_diagnosis import bench, coulomb, nothing
 
 from workbench.diagnosis.metric import metric_at
 from workbench.diagnosis.result import Verdict
-from workbench.diagnosis.scan import WIDER, scan
+from workbench.diagnosis.scan import WIDER, scan, scan_from_priors
 from workbench.diagnosis.score import modification_index
 from workbench.diagnosis.verdict import unsteady
 from workbench.fitting.problem import pose
@@ -46,6 +46,16 @@ def drop_at(problem, force_n):
     residual = windows.residuals([plant.with_values({**values, FORCE: force_n})], base.point.starts)
     metric = metric_at(base.windows, base.unknowns, base.point, problem.linearised)
     return metric.cost - metric.explained(metric.rows(residual)[0])[0]
+
+
+def test_a_scan_from_the_priors_is_asked_only_where_a_parameter_has_moved_far(rig):
+    # 3 N look like another ambient pressure, 1.8 deviations off; 10 N cannot.
+    near, far = (pose(rig, [bench(1, nothing, offset_n)]) for offset_n in (10.0, 3.0))
+
+    assert not near.moved_far
+    assert scan_from_priors(near) == []
+    assert far.moved_far
+    assert scan_from_priors(far)[0].candidate.name == "constant_force"
 
 
 def test_the_drop_with_wide_priors_is_that_of_a_scan_with_wide_priors(rig):

@@ -17,6 +17,8 @@ import numpy as np
 from workbench.compiled import compiled
 from workbench.plant_filter import PlantFilter
 
+SPREAD, COVARIANCE = 1, 3  # places of the square matrices among arguments and results
+
 
 class Updated(NamedTuple):
     """What a sample gives, X and P scaled, the others in SI units.
@@ -98,8 +100,8 @@ class FilterUpdate:
         f = self.function
         buffer, run = f.buffer()
         _, d, p = self.filter.plant.nominal
-        arguments = [_empty(f.size_in(i)) for i in range(f.n_in())]
-        results = [_empty(f.size_out(i)) for i in range(f.n_out())]
+        arguments = [_empty(f.size_in(i), i == SPREAD) for i in range(f.n_in())]
+        results = [_empty(f.size_out(i), i in (SPREAD, COVARIANCE)) for i in range(f.n_out())]
         for place, value in zip(arguments[5:], (d, p), strict=True):
             place[...] = value
         for i, each in enumerate(arguments):
@@ -120,9 +122,9 @@ class _Run(NamedTuple):
         self.call()
 
 
-def _empty(shape: tuple[int, int]) -> np.ndarray:
-    """Zeros of a size in CasADi's order, a column as a vector."""
-    return np.zeros(shape[0]) if shape[1] == 1 else np.zeros(shape, order="F")
+def _empty(shape: tuple[int, int], square: bool) -> np.ndarray:
+    """Zeros in CasADi's order; what is not a square matrix, even of one row, is a vector."""
+    return np.zeros(shape, order="F") if square else np.zeros(shape[0] * shape[1])
 
 
 def _flat(array: np.ndarray) -> memoryview:

@@ -203,7 +203,7 @@ def _from_the_leader(
 def _beside(problem: Problem, leader: Refit, rival: Profile, known: Refit | None) -> Refit:
     """A rival refitted from where the leader ended, with its own size, or else that of the scan."""
     size = {name: each.value for name, each in known.size.items()} if known else {}
-    own = size or rival.trials[0].values
+    own = {**rival.trials[0].values, **size}
     return refit_from(problem, rival.candidate, {**leader.fit.plant.values, **own})
 
 

@@ -139,20 +139,21 @@ def tie_group(base: Fit, refits: list[Refit], profiles: dict[str, Profile]) -> l
     """The leader and those that cannot be told from it, the leader first.
 
     A candidate is tied when its drop comes within a quarter of the best, or within half of it with
-    a signature in the same direction: then only the nuisances decide between the two.  Among the
-    tied those that pass every criterion come first, effects before parameters that would lie far
-    off what is known of them, and among these the held-out recording decides where it does so
-    clearly: the one that leaves at least a fifth less of the misfit there leads.  Those that look
-    most like the leader stand next to it: were it wrong, it would stand for one of them.
+    a signature in the same direction: then only the nuisances decide between the two, and on the
+    held-out recording too.  Among the tied those that pass every criterion come first, effects
+    before parameters that would lie far off what is known of them, and among these the held-out
+    recording decides where it does so clearly: the one that leaves at least a fifth less of the
+    misfit there leads.  Those that look most like the leader stand next to it: were it wrong, it
+    would stand for one of them.
     """
     best = refits[0]
     tied = [best]
     for other in refits[1:]:
-        if predicts(best) and not predicts(other):
-            continue
         gap = (best.drop_train - other.drop_train) / max(best.drop_train, 1e-12)
-        cosine = abs(_alignment_of(best, other, profiles))
-        if gap < CLOSE_DROP or (cosine > SAME_DIRECTION and gap < CLOSE_DROP_SAME):
+        same = abs(_alignment_of(best, other, profiles)) > SAME_DIRECTION
+        if predicts(best) and not predicts(other) and not same:
+            continue
+        if gap < (CLOSE_DROP_SAME if same else CLOSE_DROP):
             tied.append(other)
     tied.sort(key=lambda each: bool(reasons_against(base, each)))
     sound = [each for each in tied if not reasons_against(base, each)] or tied[:LARGEST_TIE]

@@ -30,6 +30,7 @@ STARTS = 2  # sizes of the scan that are tried
 SHARES = (2.0, 1.0, 0.5, 0.0)  # of the linear step of the nuisances that goes with each
 ITERATIONS = 4
 KEPT = 0.5  # of what the scan promised: a first fit that keeps less tries a larger size
+WORTH_LARGER = 0.1  # of the misfit, that the scan must promise for that
 WORTH_TRYING = 5.0  # times the cost of the best start
 
 
@@ -63,7 +64,8 @@ def rough_fit(problem: Problem, profile: Profile, most: int = STARTS) -> Rough:
         lent = (base.derivatives, known, windows, unknowns, start.point, start.residual)
         tried.append(follow(windows, unknowns, start, borrowed(*lent), ITERATIONS))
     fit = min(tried, key=lambda each: each.cost)
-    if base.cost - fit.cost < KEPT * profile.drop:
+    worth = profile.drop > WORTH_LARGER * problem.misfit
+    if worth and base.cost - fit.cost < KEPT * profile.drop:
         further = _from_larger(problem, windows, unknowns, profile)
         fit = min((fit, *further), key=lambda each: each.cost)
     return Rough(profile, fit, (base.cost - fit.cost) / problem.misfit)
