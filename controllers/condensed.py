@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -18,8 +18,8 @@ from linearize.modes import Mode
 from linearize.standard import PRESSURES, SUPPLY, VELOCITY
 from workbench.plant import Plant
 
-LIMITED = (0, 2, 3)  # position and pressures, of STATES
-SLACK_UNIT = np.array([1e-3, 1e4, 1e4])  # m, Pa, Pa: violations that cost alike
+SLACK_UNIT = np.array([1e-3, 0.1, 1e4, 1e4])  # m, m/s, Pa, Pa: violations that cost alike
+SLACKS = len(STATES) + 1  # one per state, and one for the rate of the opening, in V per sample
 LONGEST = 500  # samples ahead; the program is dense, and grows with the square
 OPTIMAL = 1  # DAQP's flag
 FAR = 1e30  # as good as no bound
@@ -40,8 +40,10 @@ class MpcSpec:
         The position stays this far from the end stops.
     lowest_pa, below_supply_pa
         Soft limits of the pressures, the upper one as its distance from the supply pressure.
+    fastest_m_s, rate_v_s
+        Soft limits of the speed, and of how fast the opening changes.
     slack_weight
-        Cost of violating a limit by 1 mm or 0.1 bar at one sample.
+        Cost of violating a limit by 1 mm, 0.1 m/s, 0.1 bar or 1 V per sample.
     """
 
     sample_time_s: float = 2e-3
@@ -55,6 +57,8 @@ class MpcSpec:
     margin_m: float = ranged(2e-3)
     lowest_pa: float = 1.2e5
     below_supply_pa: float = ranged(1e4)
+    fastest_m_s: float = 2.0
+    rate_v_s: float = 2.5e3
     slack_weight: float = 1e3
     positioning: PositioningSpec = field(default_factory=PositioningSpec)
 
@@ -63,16 +67,17 @@ class MpcSpec:
 class Program:
     """The quadratic program of one mode: min z'Hz/2 + g'z, lower <= rows z <= upper.
 
-    z holds the N openings and one slack per limited state.  Stacked predictions are
+    z holds the N openings, one slack per state and one for the rate.  Stacked predictions are
     X = free x + forced U + drift + pushed f, with X of shape (4 N,) and a force f on the slide.
 
     H, rows             shapes (n_z, n_z) and (n_c, n_z)
     free, forced        shapes (4 N, 4) and (4 N, N)
     drift, pushed       shapes (4 N,)
     Q                   cost of the stacked states, shape (4 N, 4 N)
-    state_limits        lower and upper of the limited states over the horizon in units of the
-                        slack, shape (2, 3 N)
+    state_limits        lower and upper of the states over the horizon in units of the slack,
+                        shape (2, 4 N)
     openings            smallest and largest opening
+    move_v              largest change of the opening from sample to sample, soft
     """
 
     H: np.ndarray
@@ -86,6 +91,7 @@ class Program:
     S: float
     state_limits: np.ndarray
     openings: tuple[float, float]
+    move_v: float
 
     @property
     def horizon(self) -> int:
@@ -105,14 +111,17 @@ class Program:
         g[0] -= 2.0 * self.S * last_v
         return g
 
-    def bounds(self, unforced: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Lower and upper side of the rows: openings, limited states twice, slacks."""
+    def bounds(self, unforced: np.ndarray, last_v: float) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper side of the rows: openings, what is soft twice, slacks."""
         n = self.horizon
-        at = (unforced.reshape(n, -1)[:, LIMITED] / SLACK_UNIT).ravel()
+        at = (unforced.reshape(n, -1) / SLACK_UNIT).ravel()
         low, high = self.state_limits
-        none = np.full(len(at), np.inf)
-        lower = [np.full(n, self.openings[0]), low - at, -none, np.zeros(len(LIMITED))]
-        upper = [np.full(n, self.openings[1]), none, high - at, np.full(len(LIMITED), np.inf)]
+        moved = np.zeros(n)
+        moved[0] = last_v
+        none, slack = np.full(len(at) + n, np.inf), np.zeros(SLACKS)
+        first, last = (np.full(n, side) for side in self.openings)
+        lower = [first, low - at, moved - self.move_v, -none, slack]
+        upper = [last, none, high - at, moved + self.move_v, slack + np.inf]
         return np.concatenate(lower), np.concatenate(upper)
 
     @cached_property
@@ -165,9 +174,9 @@ class Program:
     @cached_property
     def _order(self) -> tuple[np.ndarray, np.ndarray]:
         """Rows that bound one variable each, in the order of z, and all others."""
-        n, slacks = self.horizon, len(LIMITED)
         every = np.arange(len(self.rows))
-        return np.concatenate([every[:n], every[-slacks:]]), every[n:-slacks]
+        bounds = np.concatenate([every[: self.horizon], every[-SLACKS:]])
+        return bounds, every[self.horizon : -SLACKS]
 
     @cached_property
     def _general(self) -> np.ndarray:
@@ -189,7 +198,7 @@ def program_of(
     openings: tuple[float, float],
 ) -> Program:
     """The condensed program of a mode; ``limits`` as :func:`limits_of` gives them."""
-    small, n, N = sampled(mode, spec.sample_time_s), len(STATES), spec.horizon
+    small, N = sampled(mode, spec.sample_time_s), spec.horizon
     tolerable = np.array([spec.position_m, spec.velocity_m_s, spec.pressure_pa, spec.pressure_pa])
     Q, R, S = np.diag(tolerable**-2.0), spec.opening_v**-2.0, spec.move_v**-2.0
     scale = mode.scale
@@ -204,26 +213,47 @@ def program_of(
     push = sampled(pushed_mode(mode, area_m2), spec.sample_time_s).offset - small.offset
     _, _, pushed = stacked(small.F, small.G, push, N)
     stages = sp.block_diag([Q] * (N - 1) + [to_go]).toarray()
-    moves = np.eye(N) - np.eye(N, k=-1)
-    H = np.zeros((N + len(LIMITED),) * 2)
-    H[:N, :N] = 2.0 * (forced.T @ stages @ forced + R * np.eye(N) + S * moves.T @ moves)
-    H[N:, N:] = 2.0 * spec.slack_weight * np.eye(len(LIMITED))
-    seen = (forced.reshape(N, n, N)[:, LIMITED] / SLACK_UNIT[:, None]).reshape(-1, N)
-    slack = np.tile(np.eye(len(LIMITED)), (N, 1))
-    rows = np.block(
-        [
-            [np.eye(N), np.zeros((N, len(LIMITED)))],
-            [seen, slack],
-            [seen, -slack],
-            [np.zeros((len(LIMITED), N)), np.eye(len(LIMITED))],
-        ]
-    )
     ahead = np.tile(limits / SLACK_UNIT, N)
-    return Program(H, rows, free, forced, drift, pushed, stages, R, S, ahead, openings)
+    move_v = spec.rate_v_s * spec.sample_time_s
+    H = cost_of(forced, Q, to_go, R, S, spec.slack_weight)
+    rows = rows_of(forced)
+    return Program(H, rows, free, forced, drift, pushed, stages, R, S, ahead, openings, move_v)
+
+
+def cost_of(
+    forced: np.ndarray, Q: np.ndarray, to_go: np.ndarray, R: float, S: float, slack_weight: float
+) -> np.ndarray:
+    """H of openings and slacks under a response of shape (4 N, N), costs Q and, at last, to_go."""
+    N, n = forced.shape[1], len(Q)
+    ahead = forced.reshape(N, n, N)
+    weighed = np.concatenate([Q @ ahead[:-1], (to_go @ ahead[-1])[None]]).reshape(n * N, N)
+    moves = moves_of(N)
+    H = np.diag(np.full(N + SLACKS, 2.0 * slack_weight))
+    H[:N, :N] = 2.0 * (forced.T @ weighed + R * np.eye(N) + S * moves.T @ moves)
+    return H
+
+
+def rows_of(forced: np.ndarray) -> np.ndarray:
+    """What is limited by openings and slacks: openings, what is soft below and above, slacks."""
+    N, n = forced.shape[1], len(STATES)
+    rows = np.zeros((N + 2 * SLACKS * N + SLACKS, N + SLACKS))
+    rows[:N, :N], rows[-SLACKS:, N:] = np.eye(N), np.eye(SLACKS)
+    for side, sign in enumerate((1.0, -1.0)):
+        soft = rows[N * (1 + side * SLACKS) :][: N * SLACKS]
+        soft[: n * N, :N] = (forced.reshape(N, n, N) / SLACK_UNIT[:, None]).reshape(-1, N)
+        soft[: n * N, N:-1] = np.tile(sign * np.eye(n), (N, 1))
+        soft[n * N :, :N], soft[n * N :, -1] = moves_of(N), sign
+    return rows
+
+
+@cache
+def moves_of(N: int) -> np.ndarray:
+    """Changes of N openings, the first from nothing, shape (N, N)."""
+    return np.eye(N) - np.eye(N, k=-1)
 
 
 def limits_of(plant: Plant, spec: MpcSpec) -> np.ndarray:
-    """Lowest and highest position and pressures, shape (2, 3).
+    """Lowest and highest position, velocity and pressures, shape (2, 4).
 
     Raises
     ------
@@ -231,8 +261,8 @@ def limits_of(plant: Plant, spec: MpcSpec) -> np.ndarray:
         If nothing is left between them.
     """
     highest_pa = float(plant.values[SUPPLY]) - spec.below_supply_pa
-    low = [spec.margin_m, spec.lowest_pa, spec.lowest_pa]
-    high = [stroke_m(plant) - spec.margin_m, highest_pa, highest_pa]
+    low = [spec.margin_m, -spec.fastest_m_s, spec.lowest_pa, spec.lowest_pa]
+    high = [stroke_m(plant) - spec.margin_m, spec.fastest_m_s, highest_pa, highest_pa]
     if not np.less(low, high).all():
         what = f"margin_m {spec.margin_m:g}, lowest_pa {spec.lowest_pa:g} and below_supply_pa "
         what += f"{spec.below_supply_pa:g} leave no room on {plant.name}"

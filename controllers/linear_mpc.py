@@ -3,12 +3,17 @@
     min   sum_i |x_i - target_i|_Q^2 + |u_i - u_s|_R^2 + |u_i - u_i-1|_S^2 + |x_N - target_N|_P^2
           + rho |slack|^2
     s.t.  x_i+1 = F x_i + G u_i + offset,   u_lower <= u_i <= u_upper,
-          lower - slack <= position, pressures <= upper + slack,   slack >= 0
+          lower - slack <= position, velocity, pressures <= upper + slack,   slack >= 0,
+          |u_i - u_i-1| <= move + slack
 
 P is the cost-to-go of the LQ design, so that without active limits the first move is that of LQ.
 Steady errors are taken out by a disturbance force on the slide, which grows with the integral of
 the error: the prediction feels it and the target pressures balance it.  Inputs are limited hard,
-states softly, so that the program always has a solution.
+states and the rate of the input softly, so that the program always has a solution.
+
+The mode is that of the place to which the last plan leads in half a horizon.  Where a state is not
+finite, the solver has no answer, or its answer comes after the deadline, the last plan goes on, and
+the notes say so.
 
 Where the unconstrained optimum keeps all limits it is the solution, and DAQP is not asked.  DAQP is
 exact and three times faster here than OSQP with polish; ``tests/benchmarks/test_speed_of_mpc.py``
@@ -17,11 +22,14 @@ prints both.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from math import inf, nan
+from time import perf_counter
 
 import numpy as np
 
-from controllers.condensed import MpcSpec, Program, limits_of, program_of
+from controllers.condensed import SLACKS, MpcSpec, Program, limits_of, program_of
 from controllers.margins import Law
 from controllers.motion import PREVIEW
 from controllers.positioning import STATES, Memory, Positioning, Task, positioning
@@ -30,24 +38,43 @@ from linearize.modes import HybridModel
 from linearize.reduction import closed_command
 from workbench.contracts import Command, Estimate
 
+NONE = np.zeros(SLACKS)  # no limit is violated
+
 
 @dataclass(frozen=True)
 class Plan:
-    """The last solution: openings ahead (N,), and the whole primal z."""
+    """The last solution: openings ahead (N,), the whole primal z, and the place half-way (m)."""
 
     openings: np.ndarray
     primal: np.ndarray
+    place_m: float = nan
+
+    def shifted(self) -> Plan:
+        """The same plan a sample later, its last opening held."""
+        kept = np.append(self.openings[1:], self.openings[-1])
+        return replace(self, openings=kept, primal=np.append(kept, self.primal[len(kept) :]))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class LinearMpc:
-    """Model-predictive control of the position; see the module."""
+    """Model-predictive control of the position; see the module.
+
+    Attributes
+    ----------
+    deadline_s
+        What takes longer is late.  No limit by default, so that a run does not depend on the speed
+        of the machine.
+    clock
+        Seconds, from any moment on.
+    """
 
     task: Positioning
     programs: Schedule[Program]
     sample_time_s: float
     force_n_m_s: float
     preview: int
+    deadline_s: float = inf
+    clock: Callable[[], float] = perf_counter
 
     @property
     def laws(self) -> Schedule[Law]:
@@ -59,41 +86,67 @@ class LinearMpc:
         return Command(self.task.valve.shut, Memory())
 
     def step(self, last: Command, reference: np.ndarray, estimate: Estimate) -> Command:
-        memory, valve = last.memory, self.task.valve
-        now = self.task.task(memory, reference, estimate.pick(STATES), self.sample_time_s)
+        begun, memory, valve = self.clock(), last.memory, self.task.valve
+        x = estimate.pick(STATES)
+        if not np.isfinite(x).all():
+            return self._unseen(last)
+        now = self.task.task(memory, reference, x, self.sample_time_s)
         if now.rests:
             shut = valve.sent(0.0, estimate)
             return Command(shut, Memory(memory.integral_m_s, True), {"resting": 1.0})
-        program = self.programs.heaviest(now.x[0], now.ahead)
         integral = memory.integral_m_s + self.sample_time_s * now.rate_m
-        plan, notes = self._solved(program, now, reference, memory, integral)
+        plan, notes = self._solved(now, reference, memory, integral)
+        late = self.clock() - begun > self.deadline_s
+        if late:
+            steady = steady_plan(len(plan.openings), now.opening_v, now.x[0])
+            plan, notes = (memory.plan or steady).shifted(), {"fallback": 1.0}
         opening = float(np.clip(plan.openings[0], *valve.openings_v))
         if opening in valve.openings_v:
             integral = memory.integral_m_s
         notes = {"resting": 0.0, "opening_v": opening, "integral_m_s": integral, **notes}
+        notes["late"] = float(late)
         return Command(valve.sent(opening, estimate), Memory(integral, False, plan), notes)
 
+    def _unseen(self, last: Command) -> Command:
+        """The command where the estimate is not finite: the last plan goes on, or the valve shuts.
+
+        The spool is not led, since it is not known either.
+        """
+        memory, valve = last.memory, self.task.valve
+        if memory.plan is None:
+            return Command(valve.shut, memory, {"fallback": 1.0, "late": 0.0})
+        plan = memory.plan.shifted()
+        notes = {"opening_v": float(plan.openings[0]), "fallback": 1.0, "late": 0.0}
+        return Command(valve.command(plan.openings[0]), replace(memory, plan=plan), notes)
+
     def _solved(
-        self,
-        program: Program,
-        now: Task,
-        reference: np.ndarray,
-        memory: Memory,
-        integral: float,
+        self, now: Task, reference: np.ndarray, memory: Memory, integral: float
     ) -> tuple[Plan, dict[str, float]]:
         """The new plan; the last one, shifted, where the solver has no answer."""
-        n, before = program.horizon, memory.plan
+        before = memory.plan
         last_v = before.openings[0] if before else now.opening_v
         friction_n = self.force_n_m_s * integral
-        targets = self._targets(now, reference, n, friction_n)
-        unforced = program.unforced(now.x, friction_n - now.rise_n)
+        place_m = before.place_m if before else now.x[0]
+        program = self.programs.heaviest(place_m, now.ahead)
+        program, unforced = self._predicted(program, now, friction_n - now.rise_n, before)
+        targets = self._targets(now, reference, program.horizon, friction_n)
         g = program.gradient(unforced, targets, now.opening_v, last_v)
-        low, high = program.bounds(unforced)
+        low, high = program.bounds(unforced, last_v)
         z = -program.inverse @ g
         at = program.rows @ z
         if (at >= low).all() and (at <= high).all():
-            return Plan(z[:n], z), {"fallback": 0.0, "iterations": 0.0}
-        return limited_plan(program, g, low, high, before, now.opening_v)
+            plan, notes = Plan(z[: program.horizon], z), {"fallback": 0.0, "iterations": 0.0}
+        else:
+            plan, notes = limited_plan(program, g, low, high, before, now.opening_v)
+        middle = len(STATES) * (program.horizon // 2)
+        place_m = float(unforced[middle] + program.forced[middle] @ plan.openings)
+        return replace(plan, place_m=place_m), notes
+
+    def _predicted(
+        self, program: Program, now: Task, force_n: float, before: Plan | None
+    ) -> tuple[Program, np.ndarray]:
+        """The program of the coming samples, and the stacked states under zero openings."""
+        return program, program.unforced(now.x, force_n)
 
     def _targets(self, now: Task, reference: np.ndarray, n: int, friction_n: float) -> np.ndarray:
         """Stacked targets, shape (4 N,): the coming reference as far off as the approach allows."""
@@ -121,9 +174,13 @@ def limited_plan(
     if found:
         z, iterations = found
         return Plan(z[:n], z), {"fallback": 0.0, "iterations": float(iterations)}
-    kept = before.openings if before else np.full(n, steady_v)
-    shifted = np.append(kept[1:], kept[-1])
-    return Plan(shifted, np.append(shifted, np.zeros(len(g) - n))), {"fallback": 1.0}
+    return (before or steady_plan(n, steady_v)).shifted(), {"fallback": 1.0}
+
+
+def steady_plan(horizon: int, steady_v: float, place_m: float = nan) -> Plan:
+    """One opening all along."""
+    held = np.full(horizon, steady_v)
+    return Plan(held, np.append(held, NONE), place_m)
 
 
 def linear_mpc(hybrid: HybridModel, spec: MpcSpec | None = None) -> LinearMpc:
@@ -135,5 +192,9 @@ def linear_mpc(hybrid: HybridModel, spec: MpcSpec | None = None) -> LinearMpc:
     sizes = centre_v, task.area_m2, limits, task.valve.openings_v
     programs = scheduled(hybrid, lambda mode: program_of(mode, spec, *sizes).prepared())
     return LinearMpc(
-        task, programs, spec.sample_time_s, spec.force_n_m_s, max(spec.horizon + 1, PREVIEW)
+        task=task,
+        programs=programs,
+        sample_time_s=spec.sample_time_s,
+        force_n_m_s=spec.force_n_m_s,
+        preview=max(spec.horizon + 1, PREVIEW),
     )

@@ -37,6 +37,8 @@ DESIGNS: dict[str, tuple[str, Mapping[str, Any]]] = {
         },
     ),
     "pid": ("pid", {}),
+    "mpc": ("mpc", {}),
+    "nonlinear-mpc": ("nonlinear-mpc", {}),
 }
 """Method and numbers of each design, the first being the one that is to hold."""
 SPREAD = 95.0  # per cent of the draws within twice the limit

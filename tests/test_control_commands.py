@@ -164,8 +164,8 @@ def test_a_check_warns_once_of_a_design_for_other_values(place, monkeypatch, tmp
 def test_limits_of_the_pressures_follow_the_supply():
     low = PLANT.with_values({"supply.pressure_pa": 5e5})
 
-    assert limits_of(PLANT, MpcSpec())[1].tolist() == [stroke_m(PLANT) - 2e-3, 6.9e5, 6.9e5]
-    assert limits_of(low, MpcSpec())[1, 1:].tolist() == [4.9e5, 4.9e5]
+    assert limits_of(PLANT, MpcSpec())[1].tolist() == [stroke_m(PLANT) - 2e-3, 2.0, 6.9e5, 6.9e5]
+    assert limits_of(low, MpcSpec())[1, 2:].tolist() == [4.9e5, 4.9e5]
 
 
 def test_time_outside_the_limits_is_counted_against_the_own_supply():

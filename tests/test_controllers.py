@@ -1,17 +1,12 @@
 """What every controller must do, and what ours must equal where the answer is known."""
 
-import pickle
-
 import numpy as np
 import pytest
 from slide_controllers import SLIDE_CONTROLLERS
 
-from controllers.condensed import MpcSpec
 from controllers.design_file import design, read_design, write_design
-from controllers.linear_mpc import limited_plan, linear_mpc
 from controllers.lq import dlqr
 from controllers.positioning import STATES
-from linearize.discrete import sampled
 from linearize.standard import standard_modes
 from workbench.contracts import Estimate
 from workbench.effects import DeadZone, ValveOffset
@@ -157,108 +152,6 @@ def test_every_pid_design_is_stable_in_its_mode(controllers):
     schedule = controllers["pid"].gains
     for gain in (*schedule.forward, *schedule.backward):
         assert gain.poles.real.max() < 0.0
-
-
-@pytest.mark.parametrize("position_m", [0.2, 0.146, 0.02])
-def test_the_program_of_mpc_has_the_solution_of_a_readable_oracle(controllers, position_m):
-    """The same problem written out stage by stage for cvxpy, from a state at a limit."""
-    import cvxpy as cp
-
-    controller = controllers["mpc"]
-    program = controller.programs.forward[1]
-    n, x0 = program.horizon, np.array([0.145, 0.3, 6.8e5, 1.3e5])
-    targets = np.tile([position_m, 0.0, 5.9e5, 5.0e5], n)
-    F, G = program.free[:4], program.forced[:4, :1]
-    stage, last = program.Q[:4, :4], program.Q[-4:, -4:]
-    u, slack = cp.Variable(n), cp.Variable(3, nonneg=True)
-    x, cost, limits = x0, 1e3 * cp.sum_squares(slack), []
-    size = np.array([1e-3, 1e4, 1e4])
-    for i in range(n):
-        x = F @ x + G[:, 0] * u[i] + program.drift[:4]
-        weight = last if i == n - 1 else stage
-        root = np.linalg.cholesky(weight).T
-        cost += cp.sum_squares(root @ (x - targets[:4])) + program.R * cp.square(u[i] - 0.1)
-        cost += program.S * cp.square(u[i] - (u[i - 1] if i else 0.3))
-        limits += [u[i] >= program.openings[0], u[i] <= program.openings[1]]
-        low, high = program.state_limits[:, :3]
-        seen_ = x[[0, 2, 3]] / size
-        limits += [seen_ >= low - slack, seen_ <= high + slack]
-    cp.Problem(cp.Minimize(cost), limits).solve(solver=cp.CLARABEL)
-
-    unforced = program.unforced(x0, 0.0)
-    g = program.gradient(unforced, targets, 0.1, 0.3)
-    plan, notes = limited_plan(program, g, *program.bounds(unforced), None, 0.1)
-
-    assert notes["fallback"] == 0.0
-    assert plan.openings[:5] == pytest.approx(u.value[:5], abs=1e-3)
-
-
-def test_mpc_without_limits_and_move_cost_is_the_regulator(hybrid):
-    """The terminal cost is the cost-to-go, so any horizon gives the gain of the infinite one."""
-    spec = MpcSpec(move_v=1e6, horizon=7)
-    program = linear_mpc(hybrid, spec).programs.forward[1]
-    mode = hybrid["charge a slide + middle"]
-    small, tolerable = sampled(mode, spec.sample_time_s), np.array([1e-3, 0.1, 1e6, 1e6])
-    K = dlqr(small.F, small.G, np.diag(tolerable**-2.0), np.eye(1) / 0.3**2, mode.scale)
-
-    def first_move(x):
-        g = program.gradient(program.unforced(x, 0.0), np.tile(REST, 7), 0.0, 0.0)
-        return -(program.inverse @ g)[0]
-
-    for away in np.diag([1e-3, 0.1, 1e4, 1e4]):
-        assert first_move(REST + away) - first_move(REST) == pytest.approx(-(K @ away)[0], rel=1e-3)
-
-
-def test_mpc_at_its_limits_gives_the_same_answer_whatever_it_solved_before(controllers):
-    controller, far = controllers["mpc"], seen([0.145, -1.5, 1.1e5, 6.95e5])
-    first = controller.step(controller.start(), held(controller, 0.28), far)
-    controller.step(first, held(controller, 0.01), seen([0.01, 1.0, 6.9e5, 1.0e5]))
-    again = controller.step(controller.start(), held(controller, 0.28), far)
-
-    assert first.notes["iterations"] > 0
-    assert np.array_equal(first.value, again.value)
-
-
-def test_mpc_replays_a_run_at_its_limits_to_the_last_bit(hybrid, controllers):
-    """In any order, after a program without an answer, with a solver of its own, and unpickled."""
-    fresh = linear_mpc(hybrid, MpcSpec())
-    rng = np.random.default_rng(3)
-    states = REST + [0.1, 1.5, 1.3e5, 1.3e5] * rng.uniform(-1.0, 1.0, (30, 4))
-
-    def planned(program, order):
-        found = {}
-        for k in order:
-            unforced = program.unforced(states[k], 0.0)
-            g = program.gradient(unforced, np.tile([0.28, 0.0, 5.9e5, 5.0e5], 20), 0.1, 0.3)
-            plan, notes = limited_plan(program, g, *program.bounds(unforced), None, 0.1)
-            found[k] = (plan.primal, plan.openings, notes)
-        return [found[k] for k in range(len(states))]
-
-    first = planned(controllers["mpc"].programs.forward[1], range(len(states)))
-    program = fresh.programs.forward[1]
-    limited_plan(
-        program,
-        np.full(len(program.H), np.nan),
-        *program.bounds(program.unforced(states[0], 0.0)),
-        None,
-        0.0,
-    )
-    for other in (program, pickle.loads(pickle.dumps(program))):
-        for one, again in zip(first, planned(other, rng.permutation(len(states))), strict=True):
-            assert np.array_equal(one[0], again[0]) and np.array_equal(one[1], again[1])
-            assert one[2] == again[2]
-
-
-def test_mpc_falls_back_on_its_last_plan(controllers):
-    controller = controllers["mpc"]
-    program = controller.programs.forward[1]
-    before = controller.step(controller.start(), held(controller, 0.16), seen(REST)).memory.plan
-    low, high = program.bounds(program.unforced(REST, 0.0))
-
-    plan, notes = limited_plan(program, np.full(len(program.H), np.nan), low, high, before, 0.0)
-
-    assert notes["fallback"] == 1.0
-    assert plan.openings[:-1] == pytest.approx(before.openings[1:])
 
 
 def test_the_dead_zone_is_undone_outside_a_narrow_zone_of_transition(controllers):

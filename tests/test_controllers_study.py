@@ -46,6 +46,8 @@ def test_a_draw_that_is_lost_is_named_and_the_figure_is_drawn_without_it():
     assert not claim.holds and claim.found == "cascade with 10 kg, draw 3"
     assert list(found.figures) == ["yardsticks"]
     assert len(found.figures["yardsticks"].axes) == len(LIMITS)
+    shown = found.figures["yardsticks"].axes[0].get_legend_handles_labels()[1]
+    assert shown == [*DESIGNS, "published"]
 
 
 def test_an_error_of_another_design_breaks_no_claim():

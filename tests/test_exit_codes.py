@@ -40,7 +40,8 @@ def test_an_unknown_name_reads_as_its_message_and_is_a_key_error(capsys):
     with pytest.raises(typer.Exit), answering(quiet=True):
         raise refused.value
 
-    said = "no controller lqq; there is pid, lq, mpc, cascade, hybrid-mpc; did you mean 'lq'?"
+    known = "pid, lq, mpc, cascade, hybrid-mpc, nonlinear-mpc"
+    said = f"no controller lqq; there is {known}; did you mean 'lq'?"
     assert capsys.readouterr().err == f"workbench: {said}\n"
 
 

@@ -97,7 +97,11 @@ def design(
     rig: RigFile,
     controller: Annotated[
         str,
-        typer.Option("--controller", metavar="METHOD", help="pid, lq, mpc, cascade; hybrid-mpc."),
+        typer.Option(
+            "--controller",
+            metavar="METHOD",
+            help="pid, lq, mpc, cascade, nonlinear-mpc; hybrid-mpc.",
+        ),
     ],
     output: Output,
     spec: Spec = None,

@@ -7,12 +7,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from studies.figures.style import BLACK, BLUE, GREEN, PAGE_IN, PURPLE, RED, new_figure, styled
+from studies.figures.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    ORANGE,
+    PAGE_IN,
+    PURPLE,
+    RED,
+    new_figure,
+    styled,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-LOOKS = ((BLUE, "o"), (RED, "s"), (GREEN, "^"), (PURPLE, "D"))  # colour and marker of a design
+LOOKS = ((BLUE, "o"), (RED, "s"), (GREEN, "^"), (PURPLE, "D"), (ORANGE, "v"))  # of a design
 APART = 0.18  # of the distance between payloads
 
 

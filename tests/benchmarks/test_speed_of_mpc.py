@@ -41,7 +41,7 @@ def cases(programs):
         unforced = program.unforced(x, 0.0)
         targets = np.tile([place_m, 0.0, 5e5, 5e5], program.horizon)
         g = program.gradient(unforced, targets, 0.0, 0.0)
-        low, high = program.bounds(unforced)
+        low, high = program.bounds(unforced, 0.0)
         at = program.rows @ (-program.inverse @ g)
         if (at < low).any() or (at > high).any():
             yield program, g, low, high

@@ -1,0 +1,61 @@
+"""Nonlinear MPC by real-time iteration: one Gauss-Newton program per sample along the last plan.
+
+The problem is that of :mod:`controllers.linear_mpc`, with the reduced plant itself in place of a
+mode: at each sample it runs from the estimate under the shifted last plan, and the program of the
+sensitivities along that path is solved once.  The terminal cost and the limits are those of the
+mode to which the plan leads, and so is the force on the slide that takes out steady errors: what
+differs from linear MPC are the flows and volumes alone.
+
+Source: Diehl, Bock and Schloeder 2005, "A real-time iteration scheme for nonlinear optimization in
+optimal feedback control", SIAM J. Control Optim. 43(5).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from controllers.condensed import MpcSpec, Program, cost_of, rows_of
+from controllers.linear_mpc import LinearMpc, Plan, linear_mpc
+from controllers.positioning import STATES, Task
+from controllers.rollout import Rollout, sliding_advance
+from linearize.modes import HybridModel
+
+
+@dataclass(frozen=True, kw_only=True)
+class NonlinearMpc(LinearMpc):
+    """Linear MPC whose program is made anew along the last plan; see the module."""
+
+    rollout: Rollout
+
+    def _predicted(
+        self, program: Program, now: Task, force_n: float, before: Plan | None
+    ) -> tuple[Program, np.ndarray]:
+        shifted = before.shifted().openings if before else np.full(program.horizon, now.opening_v)
+        openings = np.clip(shifted, *program.openings)
+        side = 1.0 if now.ahead >= 0.5 else -1.0  # a share of friction would leave the slide stuck
+        return along(program, self.rollout, now.x, openings, [side, force_n])
+
+
+def along(
+    program: Program, rollout: Rollout, x: np.ndarray, openings: np.ndarray, d: list[float]
+) -> tuple[Program, np.ndarray]:
+    """The program along the path of these openings (N,), and its states under zero openings."""
+    states, forced = rollout(x, openings, np.array(d))
+    n = len(STATES)
+    slack_weight = program.H[-1, -1] / 2.0
+    costs = program.Q[:n, :n], program.Q[-n:, -n:], program.R, program.S, slack_weight
+    near = replace(program, H=cost_of(forced, *costs), rows=rows_of(forced), forced=forced)
+    return near, states - forced @ openings
+
+
+def nonlinear_mpc(hybrid: HybridModel, spec: MpcSpec | None = None) -> NonlinearMpc:
+    """The design on the reduced plant of the hybrid model."""
+    spec = spec or MpcSpec()
+    linear = linear_mpc(hybrid, spec)
+    advance = sliding_advance(hybrid.model, spec.sample_time_s)
+    rollout = Rollout(advance, spec.horizon, tuple(map(hybrid.model.states.index, STATES)))
+    _ = rollout.ahead  # compiled now, so that the first sample need not wait
+    parts = {f.name: getattr(linear, f.name) for f in fields(linear)}
+    return NonlinearMpc(**parts, rollout=rollout)
