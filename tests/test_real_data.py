@@ -60,7 +60,9 @@ def test_the_vertical_cylinder_starts_with_coulomb_friction_and_predicts_unseen_
 def test_kicks_that_agree_earn_friction_that_depends_on_position():
     found, unseen_m = improved_cylinder(vertical_cylinder.ALIKE)
 
-    assert names(found) == ["coulomb_friction", "viscous_friction", "friction_position"]
+    # A cushion at the end stands in for the place at first; the backward pass takes it out again.
+    assert names(found)[:2] == ["coulomb_friction", "viscous_friction"]
+    assert found.kept == ("coulomb_friction", "viscous_friction", "friction_position")
     assert unseen_m < 1.1 * 4.4e-3
 
 
