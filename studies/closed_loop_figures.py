@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from workbench.closed_loop import LoopRecord
 
-LINES = ("-", "--", "-.", ":")
+LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1)), (0, (3, 1)))
 A_STEP = 20.0  # an error beyond so many times the range of interest is the step itself
 
 
