@@ -12,35 +12,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from estimators.foreseen import Foresight
+from estimators.wrapped import Wrapped
 from workbench.contracts import Estimate
 
 
 @dataclass(frozen=True, kw_only=True)
-class Gated:
+class Gated(Wrapped):
     """Any estimator behind a gate; the note ``outliers`` counts what was left out of a sample."""
 
-    inner: Any
     deviations: float = 5.0
     patience: int = 20
-
-    @property
-    def sample_time_s(self) -> float:
-        return self.inner.sample_time_s
-
-    @property
-    def plant(self) -> Any:
-        """The plant of the estimator."""
-        return self.inner.plant
-
-    @property
-    def measurement_noise(self) -> Any:
-        """That of the estimator."""
-        return self.inner.measurement_noise
 
     def start(self, measurement: np.ndarray) -> Estimate:
         begun = self.inner.start(measurement)

@@ -13,10 +13,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
+from estimators.wrapped import Wrapped
 from workbench.contracts import Estimate
 
 
@@ -30,10 +30,9 @@ class _Sample:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Late:
+class Late(Wrapped):
     """Any estimator with outputs that are late by ``samples``, by name; others are in time."""
 
-    inner: Any
     samples: Mapping[str, int]
 
     def __post_init__(self) -> None:
@@ -41,20 +40,6 @@ class Late:
         if unknown or min(self.samples.values(), default=0) < 0:
             known = ", ".join(self.inner.plant.measured)
             raise ValueError(f"late outputs need whole samples from 0 on, for some of {known}")
-
-    @property
-    def sample_time_s(self) -> float:
-        return self.inner.sample_time_s
-
-    @property
-    def plant(self) -> Any:
-        """The plant of the estimator."""
-        return self.inner.plant
-
-    @property
-    def measurement_noise(self) -> Any:
-        """That of the estimator."""
-        return self.inner.measurement_noise
 
     def start(self, measurement: np.ndarray) -> Estimate:
         begun = self.inner.start(measurement)
