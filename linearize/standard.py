@@ -8,7 +8,7 @@ from linearize.axes import DRIVE, drive_axis, joint_axes, rig_axis
 from linearize.cylinder_modes import place_modes
 from linearize.cylinder_modes import regime_modes as modes_by_regime
 from linearize.equilibrium import OperatingPoint
-from linearize.leg_modes import leg_modes
+from linearize.leg_modes import leg_modes, leg_regimes
 from linearize.modes import HybridModel, Interval, hybrid_modes
 from linearize.reduction import DesignModel, design_model
 from linearize.shift_modes import gearbox_modes
@@ -61,6 +61,10 @@ def _crr_leg(plant: Plant) -> HybridModel:
     return leg_modes(plant, joint_axes(plant))
 
 
+def _crr_leg_regimes(plant: Plant) -> HybridModel:
+    return leg_regimes(plant, joint_axes(plant))
+
+
 def _soft_joint(plant: Plant) -> HybridModel:
     return filling_modes(plant, bellows(plant))
 
@@ -89,6 +93,7 @@ STANDARD_MODES: dict[str, Callable[[Plant], HybridModel]] = {
 REGIME_MODES: dict[str, Callable[[Plant], HybridModel]] = {
     "servo_drive": _servo_drive_regimes,
     "crr_rig": _crr_rig,
+    "crr_leg": _crr_leg_regimes,
 }
 """Valve x flow regimes x friction x stops, for plants whose standard modes may be fewer."""
 
