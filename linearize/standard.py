@@ -1,4 +1,7 @@
-"""The standard modes of each plant: where its signals are cut, and where the points lie."""
+"""The standard modes of each plant: where its signals are cut, and where the points lie.
+
+Source: physics.md 4.2 (gearbox) and 4.3 (all others).
+"""
 
 from __future__ import annotations
 
