@@ -10,6 +10,7 @@ from studies import (
     identification_study,
     mode_placement,
     paper_004,
+    robustness_study,
     shift_study,
 )
 from studies.study import Study
@@ -24,6 +25,7 @@ STUDIES: dict[str, Study] = {
         identification_study.STUDY,
         mode_placement.STUDY,
         paper_004.STUDY,
+        robustness_study.STUDY,
         shift_study.STUDY,
     )
 }
