@@ -5,6 +5,7 @@ from __future__ import annotations
 from studies import (
     controllers_study,
     estimators_study,
+    fidelity_study,
     gear_shift_study,
     hidden_study,
     identification_study,
@@ -21,6 +22,7 @@ STUDIES: dict[str, Study] = {
         controllers_study.STUDY,
         gear_shift_study.STUDY,
         estimators_study.STUDY,
+        fidelity_study.STUDY,
         hidden_study.STUDY,
         identification_study.STUDY,
         mode_placement.STUDY,

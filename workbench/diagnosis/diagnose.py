@@ -25,6 +25,7 @@ from workbench.diagnosis.judge import (
     alignment,
     predicts,
     reasons_against,
+    share_removed,
 )
 from workbench.diagnosis.law import empirical_law
 from workbench.diagnosis.next_recording import recommended
@@ -242,7 +243,7 @@ def _law(
     """
     leader = ranking[0] if ranking else None
     certain = leader and leader.accepted and leader.kind is Kind.EFFECT
-    if leader and certain and leader.drop_train >= CERTAIN_SHARE:
+    if leader and certain and share_removed(leader) >= CERTAIN_SHARE:
         return None
     progress("empirical law")
     led_by = (p.drop for p in profiles if certain and p.candidate == leader.candidate)
