@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from studies import (
     controllers_study,
+    delay_study,
     estimators_study,
     fidelity_study,
     gear_shift_study,
@@ -20,6 +21,7 @@ STUDIES: dict[str, Study] = {
     study.name: study
     for study in (
         controllers_study.STUDY,
+        delay_study.STUDY,
         gear_shift_study.STUDY,
         estimators_study.STUDY,
         fidelity_study.STUDY,
