@@ -103,6 +103,7 @@ def modes_document(
         "rig": rig_name,
         "left_out": [vars(item) for item in hybrid.model.left_out],
         "no_modes": [vars(item) for item in hybrid.no_modes],
+        "jumps": [vars(jump) for jump in hybrid.jumps],
         "modes": document(hybrid, regions),
     }
 
