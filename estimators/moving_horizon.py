@@ -30,8 +30,9 @@ from estimators.extended_kalman import ExtendedKalman
 from estimators.horizon import Horizon
 from estimators.losses import Loss, Squared
 from estimators.nearest_inside import OutsideError, nearest_inside
+from estimators.stochastic_plant import StochasticPlant
 from workbench.contracts import Estimate
-from workbench.plant import Plant, require
+from workbench.plant import require
 from workbench.rosenbrock import COARSEST_STEP_S
 
 HALVINGS = 4
@@ -67,13 +68,13 @@ class Step:
 
 
 @dataclass(frozen=True, kw_only=True)
-class MovingHorizon:
+class MovingHorizon(StochasticPlant):
     """An estimator that looks back over ``horizon`` samples; see the module.
+
+    In the window, too, states and unknown inputs wander by their noise.
 
     Attributes
     ----------
-    measurement_noise, process_noise, unknown_inputs
-        As in :class:`ExtendedKalman`; in the window, too, states and unknown inputs wander so.
     constants
         Parameters that are one value over the window, by ``part.parameter_unit``, with the standard
         deviation of their movement from one sample to the next: the smaller, the dearer.
@@ -101,11 +102,6 @@ class MovingHorizon:
         For names that the plant does not have.
     """
 
-    plant: Plant
-    sample_time_s: float
-    measurement_noise: Mapping[str, float]
-    process_noise: Mapping[str, float]
-    unknown_inputs: Mapping[str, float] = field(default_factory=dict)
     constants: Mapping[str, float] = field(default_factory=dict)
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     loss: Loss = Squared()
@@ -158,13 +154,8 @@ class MovingHorizon:
         """The filter that starts the window and takes over; to it constants are random walks."""
         per_s = self.sample_time_s**-0.5
         walks = {name: movement * per_s for name, movement in self.constants.items()}
-        return ExtendedKalman(
-            plant=self.plant,
-            sample_time_s=self.sample_time_s,
-            measurement_noise=self.measurement_noise,
-            process_noise=self.process_noise,
-            unknown_inputs={**self.unknown_inputs, **walks},
-        )
+        unknown = {**self.unknown_inputs, **walks}
+        return ExtendedKalman(**self.assumed | {"unknown_inputs": unknown})
 
     @cached_property
     def functions(self) -> Horizon:
