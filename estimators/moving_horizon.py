@@ -45,6 +45,11 @@ def allowed(cost: float) -> float:
     return cost * (1.0 + GROWTH) + ROUNDING
 
 
+def sound(P: np.ndarray) -> bool:
+    """Variances that can be: finite, and below zero only by rounding."""
+    return bool((P.diagonal() >= -(ROUNDING**2)).all() and np.isfinite(P).all())
+
+
 class LostError(ArithmeticError):
     """No step lowers the cost, or something is not finite."""
 
@@ -219,7 +224,8 @@ class MovingHorizon(StochasticPlant):
             return None
         if self.bounds and not ((self._limits[0] <= X) & (self._limits[1] >= X)).all():
             return None
-        return Step(Window(tape, X, self._square(told[1 + len(X) :])), 1.0, False)
+        P = self._square(told[1 + len(X) :])
+        return Step(Window(tape, X, P), 1.0, False) if sound(P) else None
 
     def _searched(self, tape: np.ndarray) -> Step:
         """The longest of the halved steps that lowers the cost, held inside the bounds.
@@ -233,8 +239,8 @@ class MovingHorizon(StochasticPlant):
         functions, (lower, upper), n = self.functions, self._limits, len(self._names)
         aim, told = functions.solve(tape, np.zeros(n))
         before, newest, P = told[0], told[1 : n + 1], self._square(told[n + 1 :])
-        if not np.isfinite(told).all():
-            raise LostError("the linear problem is not finite")
+        if not (np.isfinite(told).all() and sound(P)):
+            raise LostError("the linear problem is not finite, or its variances are below zero")
         at = functions.part(tape, "points")[:, -1]
         if ((at < lower) | (at > upper)).any():  # to come back inside may cost anything
             before = inf
