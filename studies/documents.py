@@ -112,9 +112,15 @@ def check_document(rig_name: str, found: Check) -> Document:
     """A closed-loop check: one entry per run, in SI."""
     rows = []
     for row in found.rows:
-        values = {key: v if isinstance(v, str) else plain(v) for key, v in vars(row).items()}
+        values = {key: _plain_figure(value) for key, value in vars(row).items()}
         rows.append({**values, "reached": row.reached})
     return {"schema": "workbench.check/1", "rig": rig_name, "runs": rows}
+
+
+def _plain_figure(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: plain(each) for key, each in value.items()}
+    return value if isinstance(value, str) else plain(value)
 
 
 def errors(
