@@ -96,4 +96,5 @@ STUDY = Study(
     question="do the identification procedures of paper 002 find what was put into the truth?",
     source="paper 002, S002-1 to S002-7",
     run=run,
+    rows=("S002-1", "S002-2", "S002-3", "S002-4", "S002-5", "S002-7", "S002-11"),
 )

@@ -6,7 +6,6 @@ from math import pi, radians
 import numpy as np
 import pytest
 from cylinder_modes import PLANTS, cylinder_modes
-from network_loop import tracked
 
 from controllers.derivative import LowPassDerivative, SpanDerivative, settled
 from controllers.margins import both_ways_s, margins_of
@@ -24,6 +23,7 @@ from controllers.scheduled import Schedule, driven_modes
 from controllers.two_degree_pid import Dither, PidGains, law_of
 from estimators.raw import RawMeasurement
 from linearize.standard import standard_modes
+from studies.papers.loops import tracked
 from workbench.closed_loop import Hardware, close_loop
 from workbench.contracts import Estimate
 from workbench.errors import InputError
