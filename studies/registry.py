@@ -12,6 +12,7 @@ from studies import (
     paper_004,
     shift_study,
 )
+from studies.papers import rig_valve
 from studies.study import Study
 
 STUDIES: dict[str, Study] = {
@@ -25,5 +26,6 @@ STUDIES: dict[str, Study] = {
         mode_placement.STUDY,
         paper_004.STUDY,
         shift_study.STUDY,
+        rig_valve.STUDY,
     )
 }

@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING
 
+from studies.study import Claim, Outcome
 from studies.text import columns
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)
@@ -42,6 +47,17 @@ def findings_text(found: Iterable[Finding]) -> str:
     return "\n\n".join(filter(None, (table, "\n".join(said))))
 
 
-def findings_numbers(found: Iterable[Finding]) -> list[Mapping[str, str]]:
-    """The same for JSON."""
-    return [asdict(each) for each in found]
+def outcome(
+    found: Iterable[Finding],
+    claims: Iterable[Claim],
+    figures: Mapping[str, Figure],
+    tables: Iterable[str] = (),
+) -> Outcome:
+    """What a study of rows gives: tables, findings, claims, figures."""
+    found = list(found)
+    return Outcome(
+        text="\n\n".join((*tables, findings_text(found))),
+        claims=tuple(replace(each, holds=bool(each.holds)) for each in claims),
+        figures=figures,
+        numbers={"findings": [asdict(each) for each in found]},
+    )
