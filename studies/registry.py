@@ -12,7 +12,7 @@ from studies import (
     paper_004,
     shift_study,
 )
-from studies.papers import rig_valve
+from studies.papers import network_loop, rig_loops, rig_open_loop, rig_valve, shift_timing
 from studies.study import Study
 
 STUDIES: dict[str, Study] = {
@@ -27,5 +27,9 @@ STUDIES: dict[str, Study] = {
         paper_004.STUDY,
         shift_study.STUDY,
         rig_valve.STUDY,
+        rig_open_loop.STUDY,
+        rig_loops.STUDY,
+        network_loop.STUDY,
+        shift_timing.STUDY,
     )
 }

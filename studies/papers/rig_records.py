@@ -6,16 +6,24 @@ order, walls that take heat, a bent area law, slow sensors, friction along the s
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from studies.papers.loops import Pid
 from studies.truth import crr_rig as true
 from studies.truth.batch import stack
 from studies.truth.crr_rig_draw import draw, rig_of
-from studies.truth.crr_rig_integrate import open_loop
-from studies.truth.crr_rig_record import POSITION_NOISE_M, PRESSURE_NOISE_PA, PRESSURE_STEP_PA
+from studies.truth.crr_rig_integrate import advance, bench, observed, open_loop
+from studies.truth.crr_rig_record import (
+    COMMAND_STEP_V,
+    POSITION_NOISE_M,
+    PRESSURE_NOISE_PA,
+    PRESSURE_STEP_PA,
+)
 from studies.truth.instruments import quantised
+from workbench.contracts import Estimate
 
 FIXED_KG = 1e12  # a piston that does not move
 SUBSTEPS = 10  # of a millisecond where the piston is fixed; half as many change nothing
@@ -85,3 +93,31 @@ def recorded(
         rod_side_pa=read("rod_pressure_pa", PRESSURE_NOISE_PA, PRESSURE_STEP_PA),
         supply_pa=seen["supply_pa"],
     )
+
+
+def followed(
+    rig: true.CrrRig, pids: Sequence[Pid], references_m: np.ndarray, substeps: int = 20
+) -> tuple[np.ndarray, np.ndarray]:
+    """True position and velocity, shape (n_samples, n_runs), under a position loop each.
+
+    The loops see a noisy potentiometer and send through a converter of 12 bits; all start at rest
+    where their references, of the same shape, begin.
+    """
+    n = len(pids)
+    prepared = bench(stack([rig] * n), substeps)
+    state = true.at_rest(prepared.rig, references_m[0])
+    noise = POSITION_NOISE_M * np.random.default_rng(5).standard_normal(references_m.shape)
+    commands = [pid.start() for pid in pids]
+    rows = []
+    for k, wanted in enumerate(references_m):
+        seen = observed(state)
+        rows.append((seen["true_position_m"], seen["velocity_m_s"]))
+        read = quantised(seen["position_m"] + noise[k], true.STROKE_M / 4096)
+        commands = [
+            pid.step(last, np.array([[r]]), Estimate((pid.signal,), np.array([y]), np.eye(1)))
+            for pid, last, r, y in zip(pids, commands, wanted, read, strict=True)
+        ]
+        sent = np.array([each.value[0] for each in commands])
+        state = advance(prepared, state, quantised(sent, COMMAND_STEP_V))
+    position, velocity = np.array(rows).transpose(1, 0, 2)
+    return position, velocity
