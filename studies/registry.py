@@ -12,7 +12,15 @@ from studies import (
     paper_004,
     shift_study,
 )
-from studies.papers import network_loop, rig_loops, rig_open_loop, rig_valve, shift_timing
+from studies.papers import (
+    joint_models,
+    network_loop,
+    rig_loops,
+    rig_open_loop,
+    rig_valve,
+    shift_timing,
+    soft_valve,
+)
 from studies.study import Study
 
 STUDIES: dict[str, Study] = {
@@ -29,7 +37,9 @@ STUDIES: dict[str, Study] = {
         rig_valve.STUDY,
         rig_open_loop.STUDY,
         rig_loops.STUDY,
+        joint_models.STUDY,
         network_loop.STUDY,
         shift_timing.STUDY,
+        soft_valve.STUDY,
     )
 }
