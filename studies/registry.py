@@ -13,6 +13,7 @@ from studies import (
     shift_study,
 )
 from studies.papers import (
+    drive_details,
     joint_models,
     network_loop,
     rig_loops,
@@ -39,6 +40,7 @@ STUDIES: dict[str, Study] = {
         rig_loops.STUDY,
         joint_models.STUDY,
         network_loop.STUDY,
+        drive_details.STUDY,
         shift_timing.STUDY,
         soft_valve.STUDY,
     )

@@ -250,7 +250,8 @@ def _figure(corners: list[Corner]):
             Line(share, np.array([each.creep_pa_s for each in corners]) / PSI_PA, "", "-", ORANGE),
             Line(share, np.array([each.creep_pa_s for each in corners]) / PSI_PA, "", "o", ORANGE),
         ],
-        logarithmic="xy",
+        logarithmic="y",
+        x_range=(0.0, 0.042),
     )
     return panels_figure([[left, right]], PAGE_IN, 2.8, legend_columns=4)
 
