@@ -15,6 +15,16 @@ from studies import (
     robustness_study,
     shift_study,
 )
+from studies.papers import (
+    drive_details,
+    joint_models,
+    network_loop,
+    rig_loops,
+    rig_open_loop,
+    rig_valve,
+    shift_timing,
+    soft_valve,
+)
 from studies.study import Study
 
 STUDIES: dict[str, Study] = {
@@ -31,5 +41,13 @@ STUDIES: dict[str, Study] = {
         paper_004.STUDY,
         robustness_study.STUDY,
         shift_study.STUDY,
+        rig_valve.STUDY,
+        rig_open_loop.STUDY,
+        rig_loops.STUDY,
+        joint_models.STUDY,
+        network_loop.STUDY,
+        drive_details.STUDY,
+        shift_timing.STUDY,
+        soft_valve.STUDY,
     )
 }
