@@ -49,6 +49,7 @@ def _compared(each: RecordingComparison) -> Document:
             public_name(name): plain(residual.outside) for name, residual in each.residuals.items()
         },
         "judged_on": each.judged,
+        "window_s": plain(each.window_s),
         "by_regime": [
             {
                 "regime": regime.name,
