@@ -14,11 +14,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import chain, product
+from math import inf
+
+import numpy as np
 
 from linearize.axis import Axis, Box
-from linearize.cuts import Region
+from linearize.cuts import Interval, Region
 from linearize.equilibrium import OperatingPoint, operating_point
-from linearize.modes import HybridModel, Placing, hybrid_modes
+from linearize.modes import HybridModel, Mode, Placing, hybrid_modes
 from linearize.reduction import DesignModel, LeftOut, design_model
 from linearize.stopped import AT_STOPS, guarded, stop_cut
 from workbench.plant import Plant
@@ -94,3 +97,49 @@ def leg_placing(axes: tuple[Axis, ...]) -> Placing:
         return operating_point(model, at | off) if off else found
 
     return placed
+
+
+def joint_modes(plant: Plant, axes: tuple[Axis, ...]) -> HybridModel:
+    """Of each joint {slide -, slide +} by place, the others held where the leg begins.
+
+    A joint's mode has its own angle, speed, pressures and command only: the other cylinders do not
+    move it while they hold.
+    """
+    model = design_model(plant)
+    model = replace(model, pushes={axis.velocity: axis.pressures[0] for axis in axes})
+    modes: list[Mode] = []
+    for axis in axes:
+        cuts: dict[str, tuple[Region, ...]] = {axis.velocity: axis.friction_cut()}
+        cuts[axis.position] = axis.place_cut()
+        others = (each for each in axes if each is not axis)
+        cuts |= {each.velocity: (_held(each),) for each in others}
+        made = hybrid_modes(plant, cuts, leg_placing(axes), model)
+        modes += [_own(m, axis) for m in made.modes if axis.velocity in m.state_names]
+    return HybridModel(plant, model, tuple(modes), (NO_STOPS, NO_VALVES))
+
+
+def _held(axis: Axis) -> Interval:
+    return Interval("", -inf, inf, 0.0, (axis.position, axis.velocity))
+
+
+def _own(mode: Mode, axis: Axis) -> Mode:
+    """What a mode says of one joint alone."""
+    states = (axis.position, axis.velocity, *axis.pressures)
+    x = [mode.state_names.index(name) for name in states]
+    u = [mode.command_names.index(axis.command)]
+    box = {name: mode.box[name] for name in (axis.velocity, axis.position)}
+    return replace(
+        mode,
+        name=" ".join(region.label for region in box.values()),
+        box=box,
+        state_names=states,
+        command_names=(axis.command,),
+        A=mode.A[np.ix_(x, x)],
+        B=mode.B[np.ix_(x, u)],
+        C=mode.C[:, x],
+        D=mode.D[:, u],
+        state=mode.state[x],
+        command=mode.command[u],
+        drift=mode.drift[x],
+        scale=mode.scale[x],
+    )

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 
-from linearize.axes import DRIVE, drive_axis, joint_axes, rig_axis
+from linearize.axes import DRIVE, drive_axis, joint_axes, rig_axis, travel_axis
 from linearize.axis import Axis
 from linearize.cylinder_modes import place_modes
 from linearize.cylinder_modes import regime_modes as modes_by_regime
 from linearize.cylinder_modes import sliding_modes as modes_of_sliding
 from linearize.equilibrium import OperatingPoint
-from linearize.leg_modes import leg_modes, leg_regimes
+from linearize.leg_modes import joint_modes, leg_modes, leg_regimes
 from linearize.modes import HybridModel, Interval, hybrid_modes
 from linearize.reduction import DesignModel, design_model
 from linearize.shift_modes import gearbox_modes
@@ -80,6 +80,31 @@ def _servo_reservoir(plant: Plant) -> HybridModel:
 
 SLIDE_MODES: dict[str, Callable[[Plant], HybridModel]] = {"servo_drive": _servo_drive}
 """Plants with a slide behind a proportional valve, which the controllers are designed on."""
+
+
+def _travel(plant: Plant) -> HybridModel:
+    """Friction x place, the axis sliding steadily or resting at each point."""
+    axis = travel_axis(plant)
+    cuts = {axis.velocity: axis.friction_cut(), axis.position: axis.place_cut()}
+    return hybrid_modes(plant, cuts, axis.point)
+
+
+def _joints(plant: Plant) -> HybridModel:
+    return joint_modes(plant, joint_axes(plant))
+
+
+AXIS_MODES: dict[str, Callable[[Plant], HybridModel]] = {
+    **SLIDE_MODES,
+    "crr_rig": _travel,
+    "crr_arm": _travel,
+}
+"""Plants with one axis between two chambers, whatever its units."""
+
+JOINT_MODES: dict[str, Callable[[Plant], HybridModel]] = {"crr_leg": _joints}
+"""Plants with several joints, each with its own cylinder."""
+
+VESSEL_MODES: dict[str, Callable[[Plant], HybridModel]] = {"soft_joint": _soft_joint}
+"""Plants whose pressure is controlled."""
 
 SHIFT_MODES: dict[str, Callable[[Plant], HybridModel]] = {"gearbox": gearbox_modes}
 """Plants that switching valves shift from one dedicated position to another."""
@@ -160,6 +185,39 @@ def slide_modes(plant: Plant) -> HybridModel:
         If it has no such slide.
     """
     return _among(SLIDE_MODES, plant, "no modes to position a slide with for")
+
+
+def axis_modes(plant: Plant) -> HybridModel:
+    """Modes by direction of sliding and place of a plant with one axis, and its standard modes.
+
+    Raises
+    ------
+    UnknownNameError
+        If it has no such axis.
+    """
+    return _among(AXIS_MODES, plant, "no modes to control one axis with for")
+
+
+def leg_joint_modes(plant: Plant) -> HybridModel:
+    """Modes of each joint of a plant with several, the others at rest.
+
+    Raises
+    ------
+    UnknownNameError
+        If it has no such joints.
+    """
+    return _among(JOINT_MODES, plant, "no modes to control several joints with for")
+
+
+def vessel_modes(plant: Plant) -> HybridModel:
+    """The standard modes of a plant whose pressure is controlled.
+
+    Raises
+    ------
+    UnknownNameError
+        If it has none.
+    """
+    return _among(VESSEL_MODES, plant, "no modes to control a pressure with for")
 
 
 def shift_modes(plant: Plant) -> HybridModel:

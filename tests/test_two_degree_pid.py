@@ -5,7 +5,6 @@ from math import pi, radians
 
 import numpy as np
 import pytest
-from network_loop import tracked
 
 from controllers.derivative import LowPassDerivative, SpanDerivative, settled
 from controllers.margins import both_ways_s, margins_of
@@ -23,6 +22,7 @@ from controllers.scheduled import Schedule, driven_modes
 from controllers.two_degree_pid import Dither, PidGains, law_of
 from estimators.raw import RawMeasurement
 from linearize.standard import sliding_modes, standard_modes
+from studies.papers.loops import tracked
 from workbench.closed_loop import Hardware, close_loop
 from workbench.contracts import Estimate
 from workbench.errors import InputError
