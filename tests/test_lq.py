@@ -16,7 +16,7 @@ from controllers.output_feedback import kalman_gain, lqg_law
 from controllers.regulator import RegulatorSpec, regulator
 from controllers.scheduled import driven_modes
 from linearize.discrete import sampled
-from linearize.standard import sliding_modes, standard_modes
+from linearize.standard import axis_modes, standard_modes
 from studies.closed_loop_check import run, standard_estimator
 from studies.scenarios import Scenario, sine_scenario
 from workbench.contracts import Estimate
@@ -31,12 +31,12 @@ GROWS = {"rod.velocity_m_s": 0.1, "cap.pressure_pa": 1e3, "rod_side.pressure_pa"
 
 @pytest.fixture(scope="module")
 def rig():
-    return sliding_modes(crr_rig())
+    return axis_modes(crr_rig())
 
 
 @pytest.fixture(scope="module")
 def arm():
-    return sliding_modes(crr_arm())
+    return axis_modes(crr_arm())
 
 
 @pytest.fixture(scope="module")
