@@ -80,6 +80,12 @@ def put(place: Div, html: str) -> None:
     place.update(text=html, visible=bool(html))
 
 
+def wide(table: str) -> str:
+    """A table of a terminal, which is scrolled where it is wider than the page."""
+    style = "white-space: pre; overflow-x: auto; max-width: calc(100vw - 60px)"
+    return f'<pre style="{style}" tabindex="0">{escape(table)}</pre>'
+
+
 def guide(sentence: str) -> Div:
     """The one sentence that tells what a tab is for."""
     return text(f'<p class="guide">{escape(sentence)}</p>')
