@@ -105,8 +105,7 @@ def no_wider_than_the_window(page):
     return page.evaluate("document.documentElement.scrollWidth <= window.innerWidth + 1")
 
 
-@pytest.mark.slow
-def test_recordings_are_read_compared_and_refused_and_two_tabs_do_not_mix(served, tmp_path):
+def test_a_wrong_file_is_told_on_the_page_and_two_tabs_do_not_mix(served, tmp_path):
     page_of = served(drive_files(tmp_path), "rig.toml", "train.csv", "validation.csv")
     page, other = page_of.tab(), page_of.tab()
     page.wait_for_selector("text=Plausible?")
@@ -116,21 +115,31 @@ def test_recordings_are_read_compared_and_refused_and_two_tabs_do_not_mix(served
     click(page, "Open rig")
     page.wait_for_selector("text=nowhere.toml: there is no such file")
     page.get_by_label("validation.csv is for").select_option("not used")
+    page.wait_for_selector("text=validation = [workbench.read_recording(rig, path) for path in []]")
+
+    assert other.get_by_label("validation.csv is for").input_value() == "validation"
+    page_of.shot(page, "wrong_file")
+    assert {url.split("/")[2] for url in page_of.asked} == {page_of.address.split("/")[2]}
+
+
+@pytest.mark.slow
+def test_a_box_drawn_with_the_mouse_lights_samples_up(served, tmp_path):
+    page_of = served(drive_files(tmp_path), "rig.toml", "train.csv")
+    page = page_of.tab()
+    page.wait_for_selector("text=Plausible?")
     click(page, "2 Compare")
     click(page, "Compare")
     page.wait_for_selector("text=Errors of train")
+    page.wait_for_timeout(1000)
 
-    assert other.get_by_label("validation.csv is for").input_value() == "validation"
-    click(other, "2 Compare")
-    assert other.get_by_text("Errors of train").count() == 0
     box = page.locator("canvas:visible").first.bounding_box()
     page.mouse.move(box["x"] + 120, box["y"] + 40)
     page.mouse.down()
     page.mouse.move(box["x"] + 260, box["y"] + 70, steps=5)
     page.mouse.up()
+
     page.wait_for_selector("text=samples lit")
-    page_of.shot(page, "small_compare")
-    assert {url.split("/")[2] for url in page_of.asked} == {page_of.address.split("/")[2]}
+    page_of.shot(page, "brushed")
 
 
 @pytest.mark.slow

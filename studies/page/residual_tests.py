@@ -27,7 +27,7 @@ class ResidualTests:
         from bokeh.models import BoxAnnotation, ColumnDataSource
 
         self._sources, self._bands, self._charts = [], [], []
-        for y in ("autocorrelation (-)", "correlation with input (-)"):
+        for y in ("autocorrelation (-)", "with the input (-)"):
             source = ColumnDataSource({"lag": [], "value": []})
             found = chart("lag (ms)", y, HEIGHT)
             band = BoxAnnotation(bottom=0, top=0, fill_color=SOFT, fill_alpha=0.18)
