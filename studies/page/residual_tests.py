@@ -28,7 +28,7 @@ class ResidualTests:
 
         self._sources, self._bands, self._charts = [], [], []
         for y in ("autocorrelation (-)", "with the input (-)"):
-            source = ColumnDataSource({"lag": [], "value": []})
+            source = ColumnDataSource(data={"lag": [], "value": []})
             found = chart("lag (ms)", y, HEIGHT)
             band = BoxAnnotation(bottom=0, top=0, fill_color=SOFT, fill_alpha=0.18)
             found.add_layout(band)
