@@ -101,6 +101,17 @@ def click(page, label):
     page.get_by_role("button", name=label, exact=True).last.click()
 
 
+def drag(page, x, y, far):
+    """Draw a box to the right as slowly as a hand does."""
+    page.mouse.move(x, y)
+    page.wait_for_timeout(200)
+    page.mouse.down()
+    for k in range(1, 9):
+        page.mouse.move(x + far * k / 8, y + 3 * k)
+        page.wait_for_timeout(50)
+    page.mouse.up()
+
+
 def no_wider_than_the_window(page):
     return page.evaluate("document.documentElement.scrollWidth <= window.innerWidth + 1")
 
@@ -132,11 +143,10 @@ def test_a_box_drawn_with_the_mouse_lights_samples_up(served, tmp_path):
     page.wait_for_selector("text=Errors of train")
     page.wait_for_timeout(1000)
 
-    box = page.locator("canvas:visible").first.bounding_box()
-    page.mouse.move(box["x"] + 120, box["y"] + 40)
-    page.mouse.down()
-    page.mouse.move(box["x"] + 260, box["y"] + 70, steps=5)
-    page.mouse.up()
+    canvas = page.locator("canvas:visible").first
+    canvas.scroll_into_view_if_needed()
+    box = canvas.bounding_box()
+    drag(page, box["x"] + 160, box["y"] + 40, 140)
 
     page.wait_for_selector("text=samples lit")
     page_of.shot(page, "brushed")

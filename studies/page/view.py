@@ -58,7 +58,11 @@ class Page:
         self._cancel = button("Cancel", self.cancel, visible=False, name="cancel")
         labels = [f"{k} {tab.title}" for k, tab in enumerate(self._tabs, start=1)]
         self._choice = RadioButtonGroup(
-            labels=labels, active=0, stylesheets=[sheet(CHOICE)], name="tabs"
+            labels=labels,
+            active=0,
+            stylesheets=[sheet(CHOICE)],
+            name="tabs",
+            sizing_mode="stretch_width",
         )
         self._choice.on_change("active", lambda _a, _o, _n: self.refresh())
         self._panels = [column() for _ in self._tabs]
