@@ -6,8 +6,8 @@ import oracle_crr_rig as rig
 import pytest
 from conftest import PLANT_MODELS
 from flat_cylinder import assert_same_as_flat
-from network_loop import Pid, tracked
 
+from studies.papers.loops import Pid, tracked
 from workbench.cosimulation import cosimulate
 from workbench.effects import PacketPause, SensorDelay
 from workbench.plants.crr_arm import MOTION, ROD, crr_arm_actuator, crr_arm_engine
