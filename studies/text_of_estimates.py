@@ -93,7 +93,7 @@ def _seen(each: EstimatedRecording) -> str:
     told = "known to: least standard deviation that the outputs allow, given model and noise\n"
     if not unseen:
         return f"{told}every state is seen by {outputs}"
-    return f"{told}not observable: {unseen}; {outputs} tell nothing of it"
+    return f"{told}not observable from {outputs}: {unseen}"
 
 
 def _of_state(each: EstimatedRecording, name: str) -> list[str]:
