@@ -23,7 +23,7 @@ from workbench.filtering import correct, predict
 from workbench.plant_filter import PlantFilter
 
 SAME = 0.9  # of the deviation at first or without outputs: what leaves more tells next to nothing
-CERTAIN = 1e-3  # of a state's scale: what the model alone knows that well need not be seen
+CERTAIN = 0.05  # of its scale: what the model alone knows that well need not be seen
 
 
 @dataclass(frozen=True)
