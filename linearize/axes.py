@@ -81,6 +81,22 @@ def rig_axis(plant: Plant) -> Axis:
     return _of(plant, RIG, _ends_m(plant))
 
 
+def travel_axis(plant: Plant) -> Axis:
+    """The one axis of a plant: its slide, its rod or its joint.
+
+    Raises
+    ------
+    ValueError
+        If it has no single one.
+    """
+    if plant.measured[0] == DRIVE.position:
+        return drive_axis(plant)
+    if plant.measured[0] == RIG.position:
+        return rig_axis(plant)
+    (axis,) = joint_axes(plant)
+    return axis
+
+
 def joint_axes(plant: Plant) -> tuple[Axis, ...]:
     """Every joint that a cylinder turns; of several the labels begin with a number."""
     joints = [part for part in plant.parts if isinstance(part, Joint)]

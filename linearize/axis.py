@@ -42,6 +42,13 @@ class Travel:
             Interval(self.prefix + "slide +", rest, inf, self.sliding),
         )
 
+    def direction_cut(self) -> tuple[Interval, ...]:
+        """Sliding down and up, with nothing in between: where sticking does not matter."""
+        return (
+            Interval(self.prefix + "slide -", -inf, 0.0, -self.sliding),
+            Interval(self.prefix + "slide +", 0.0, inf, self.sliding),
+        )
+
 
 @dataclass(frozen=True, kw_only=True)
 class Axis(Travel):

@@ -68,6 +68,20 @@ class Guard:
         return self.offset + sum(w * signals[name] for name, w in self.weights.items()) >= 0.0
 
 
+@dataclass(frozen=True)
+class Jump:
+    """A state that is multiplied at once where a signal rises to a value: a body picks up another.
+
+    signal, at      what rises, and to which value
+    state, ratio    what changes, and by how much: v <- ratio * v
+    """
+
+    signal: str
+    at: float
+    state: str
+    ratio: float
+
+
 Region = Interval | Level
 Cuts = Mapping[str, tuple[Region, ...]]
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from linearize.reduction import DesignModel
+from workbench.errors import listed
 from workbench.plant import require
 
 STEPS, TOLERANCE = 60, 1e-9
@@ -70,7 +71,11 @@ def operating_point(
         move = np.clip(-np.linalg.lstsq(slope, left, rcond=None)[0], -1.0, 1.0) * size
         values, left = _shortened(values, columns, move, left, residual, rows)
     if np.abs(left).max(initial=0.0) > 1e3 * TOLERANCE:
-        raise ValueError(f"no operating point of {model.plant.name} at {dict(given)}")
+        at = listed([f"{name} {value:.4g}" for name, value in given.items()]) or "any state"
+        still = " and ".join(part for part in (", ".join(vanish[:-1]), vanish[-1]) if part)
+        raise ValueError(
+            f"{model.plant.name}: no operating point at {at} where {still} stand still"
+        )
     rates = residual(values)
     return OperatingPoint(values[:n], values[n:], rates * model.scale, float(np.abs(rates).max()))
 

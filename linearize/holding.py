@@ -1,9 +1,9 @@
 """What a mode holds, and when it lets go: dry friction at rest, a stop that carries.
 
 Held states come in pairs, a position and its velocity: the velocity is zero and the position
-stays.  A mode that brings guards of its own says by them when it ends.  For any other, the signal
-whose interval holds is let go upwards when its rate points upwards everywhere just above the
-interval, downwards when it points downwards everywhere just below,
+stays.  A mode that holds at a place, a stop or Neutral, says by guards of its own when it ends.  In
+any other, the signal whose interval holds is let go upwards when its rate points upwards everywhere
+just above the interval, downwards when it points downwards everywhere just below,
 
     min over s of f_s(x, u; s) > 0,   max over s of f_s(x, u; s) < 0,
 
@@ -53,9 +53,7 @@ class Hold:
 
 
 def holds_of(hybrid: HybridModel, mode: Mode) -> tuple[Hold, ...]:
-    """How a mode is left that holds velocities; none where guards of its own say so."""
-    if mode.guards:
-        return ()
+    """How a mode is left in whose box velocities rest; guards say so where a place is held."""
     resting = resting_states(hybrid, mode)
     cut = {s: r for s, r in mode.box.items() if s in resting and isinstance(r, Interval)}
     return tuple(_hold(hybrid, mode, signal, region) for signal, region in cut.items())

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from linearize.cuts import Guard, Interval, Level, Region, checked
+from linearize.cuts import Guard, Interval, Jump, Level, Region, checked
 from linearize.equilibrium import OperatingPoint, operating_point
 from linearize.reduction import DesignModel, LeftOut, design_model
 from workbench.errors import InputError, Message
@@ -117,13 +117,15 @@ class HybridModel:
     """A plant as a set of modes of its design model that together cover its operating range.
 
     Where several modes hold, the first of them is the active one.  ``no_modes`` are combinations of
-    regions that are none, with what takes their place and why.
+    regions that are none, with what takes their place and why; ``jumps`` what a change of modes
+    does to the state at once.
     """
 
     plant: Plant
     model: DesignModel
     modes: tuple[Mode, ...]
     no_modes: tuple[LeftOut, ...] = ()
+    jumps: tuple[Jump, ...] = ()
 
     def __getitem__(self, name: str) -> Mode:
         for mode in self.modes:

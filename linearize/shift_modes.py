@@ -17,7 +17,7 @@ import casadi as ca
 import numpy as np
 
 from linearize.axis import Travel
-from linearize.cuts import Guard, Interval, Level, Region
+from linearize.cuts import Guard, Interval, Jump, Level, Region
 from linearize.equilibrium import OperatingPoint, operating_point
 from linearize.modes import (
     Box,
@@ -101,7 +101,8 @@ def gearbox_modes(
             Interval(f"{number + 1} {charges}", 0.0, inf, into_kg_s),
         )
     hybrid = hybrid_modes(plant, cuts, _placing(FLOWS, points), model)
-    return replace(hybrid, modes=(held_at_neutral(model, points), *hybrid.modes))
+    modes = (held_at_neutral(model, points), *hybrid.modes)
+    return replace(hybrid, modes=modes, jumps=picked_up(model))
 
 
 def switched_modes(
@@ -116,7 +117,8 @@ def switched_modes(
     """
     points, model = points or ShiftPoints(), model or switched_shift_model(plant)
     cuts = {POSITION: side_cut(model, pieces), **valve_cut(points)}
-    return hybrid_modes(plant, cuts, _placing(COMMANDS, points), model)
+    made = hybrid_modes(plant, cuts, _placing(COMMANDS, points), model)
+    return replace(made, jumps=picked_up(model))
 
 
 def driving_modes(plant: Plant) -> HybridModel:
@@ -143,7 +145,7 @@ def driving_modes(plant: Plant) -> HybridModel:
     ends = (made({POSITION: (end,)}) for end in stop_cut(travel))
     stopped = (guarded(each, travel, mode) for each in ends for mode in each.modes)
     free = made({POSITION: side_cut(model), VELOCITY: travel.friction_cut()}).modes
-    return HybridModel(plant, model, (neutral, *stopped, *free), AT_STOPS)
+    return HybridModel(plant, model, (neutral, *stopped, *free), AT_STOPS, picked_up(model))
 
 
 def _at_room_temperature(plant: Plant) -> Placing:
@@ -209,6 +211,16 @@ def neutral_guards(model: DesignModel) -> tuple[Guard, ...]:
     return (*slow, *(_push(model, sign) for sign in (-1.0, 1.0)))
 
 
+def picked_up(model: DesignModel) -> tuple[Jump, ...]:
+    """The main piston picks up the floating one at Neutral on its way up, and slows down.
+
+    The impact is plastic: m_L v = m_H v+.  Both masses are those of the model, read off what p1
+    does on either side, A1/m.  On the way down the floating piston stays behind at its shoulder.
+    """
+    low, high = (_slope(model, side)[0][PRESSURES[0]] for side in (-1.0, 1.0))
+    return (Jump(POSITION, 0.0, VELOCITY, high / low),)
+
+
 def valve_flows(plant: Plant) -> Callable[[float, float], np.ndarray]:
     """(command, chamber pressure) -> flow through each valve, kg/s, shape (2,)."""
     model = switched_shift_model(plant)
@@ -237,13 +249,18 @@ def _placing(inputs: tuple[str, str], points: ShiftPoints):
 
 def _push(model: DesignModel, side: float) -> Guard:
     """The force at rest on one side of Neutral, over the mass, towards it."""
+    slopes, offset = _slope(model, side)
+    return Guard({name: -side * slope for name, slope in slopes.items()}, -side * offset)
+
+
+def _slope(model: DesignModel, side: float) -> tuple[dict[str, float], float]:
+    """The acceleration at rest beside Neutral: by pressure in m/(s2 Pa), and without pressure."""
     x, u = model.initial.copy(), np.zeros(len(model.commands))
     x[model.states.index(POSITION)], row = side * BESIDE_M, model.states.index(VELOCITY)
     columns = [model.states.index(name) for name in PRESSURES]
     slope = model.jacobians(x, u)[0].full()[row, columns]
     offset = float(model.f(x, u)[0][row]) - slope @ x[columns]
-    weights = dict(zip(PRESSURES, map(float, -side * slope), strict=True))
-    return Guard(weights, -side * float(offset))
+    return dict(zip(PRESSURES, map(float, slope), strict=True)), float(offset)
 
 
 def _rising(values: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -25,7 +25,6 @@ from studies.estimator_runs import (
     foretold,
     rmse,
     whiteness,
-    with_start,
 )
 from workbench.comparison.noise import recorded_noise
 from workbench.effect import Kind
@@ -213,7 +212,7 @@ class _Bench:
             sample_time_s=self.recording.sample_time_s,
             measurement_noise=self.noise,
             process_noise=noise_of_modes(plant, noise) if name == "kalman" else noise,
-            **with_start(ESTIMATORS[name], dict(zip(states, size, strict=True))),
+            initial_deviation=dict(zip(states, size, strict=True)),
         )
 
     @cached_property

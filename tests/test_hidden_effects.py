@@ -105,6 +105,15 @@ def test_a_law_outside_the_catalogue_is_called_that():
     assert law.balance == "slide.momentum"
 
 
+@pytest.mark.slow
+def test_an_effect_that_keeps_little_on_what_is_held_out_bars_no_law():
+    """A leak that opens with speed looks like a restricted supply, on one recording only."""
+    found = diagnosed("sliding_leak", ("sliding_leak",))
+
+    assert found.diagnosis.verdict is Verdict.NOT_IN_CATALOGUE, said([found])
+    assert found.diagnosis.law.balance == "chamber_a.mass"
+
+
 def test_the_user_s_rig_lacks_what_is_hidden():
     rig = SERVO_DRIVE.user_rig(CASES["coulomb_friction", SEED])
 

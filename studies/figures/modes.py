@@ -18,9 +18,11 @@ COLOURS = (BLUE, RED, GREEN, ORANGE)
 
 
 def pole_figure(hybrid: HybridModel) -> Figure:
-    """Poles of every mode: a panel per interval of the first cut, markers for the second."""
-    first, *rest = max((mode.box for mode in hybrid.modes), key=len)
-    second = rest[0] if rest else first
+    """Poles of every mode: a panel per region of one cut, a marker per region of another.
+
+    Markers tell where something holds, by sticking or at a stop, panels the first other cut.
+    """
+    first, second = _cuts(hybrid)
     panels = list(dict.fromkeys(_label(mode, first) for mode in hybrid.modes))
     kinds = list(dict.fromkeys(_label(mode, second) for mode in hybrid.modes))
     with styled():
@@ -58,6 +60,21 @@ def pole_figure(hybrid: HybridModel) -> Figure:
     return figure
 
 
+def _cuts(hybrid: HybridModel) -> tuple[str, str]:
+    """The signals of the panels and of the markers: of these a velocity that rests, if one does."""
+    from linearize.holding import resting_states
+
+    holding = [mode for mode in hybrid.modes if any(part.holds for part in mode.box.values())]
+    resting = (n for mode in holding for n in mode.box if n in resting_states(hybrid, mode))
+    places = (n for mode in holding for n, part in mode.box.items() if part.holds)
+    second = next(resting, next(places, None))
+    cut = [mode.box for mode in hybrid.modes if second is None or second in mode.box]
+    names = [*max(cut, key=len)]
+    second = second or names[-1]
+    return next((name for name in names if name != second), second), second
+
+
 def _label(mode: Mode, signal: str) -> str:
-    """The mode's interval of a signal; a mode that does not mind the signal holds in any."""
-    return mode.box[signal].label if signal in mode.box else "any"
+    """The mode's region of a signal; where it does not mind the signal, what it holds at."""
+    held = (region.label for region in mode.box.values() if region.holds)
+    return mode.box[signal].label if signal in mode.box else next(held, "any")
