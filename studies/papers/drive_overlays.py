@@ -139,7 +139,7 @@ def overlay_figure(found: Mapping[str, Overlay]) -> Figure:
         _panel(slow, {" a": A, " b": B}, "pressure (bar)", "drive, 0.5 Hz"),
         _panel(slow, {"": POSITION}, "position (mm)", "drive, 0.5 Hz"),
     ]
-    return panels_figure([panels[:2], panels[2:]], PAGE_IN, 4.2, legend_columns=6)
+    return panels_figure([panels[:2], panels[2:]], PAGE_IN, 4.2, legend_columns=4)
 
 
 def _panel(each: Overlay, names: Mapping[str, str], y: str, title: str) -> Panel:
@@ -148,7 +148,7 @@ def _panel(each: Overlay, names: Mapping[str, str], y: str, title: str) -> Panel
         _, scale, _ = UNITS[name]
         seen, ours = scale * each.signals[name]
         lines += [
-            Line(each.time_s, seen, f"recorded{side}", "-", "0.6", 2.0),
+            Line(each.time_s, seen, "recorded", "-", "0.6", 2.0),
             Line(each.time_s, ours, f"model{side}", "--", colour if side else BLACK),
         ]
     return Panel("time (s)", y, lines, title)
