@@ -180,6 +180,15 @@ def test_the_figure_shows_both_ways_and_both_intensities(looping):
     assert len(second.lines) == 3  # mean, the other intensity, zero
 
 
+def test_what_is_not_known_of_a_missing_term_has_no_line():
+    found = diagnosis()
+    bare = replace(found, where=replace(found.where, against=(), by_regime={}))
+
+    assert "follows" in diagnosis_text(found, UNITS) and "error in" in diagnosis_text(found, UNITS)
+    text = diagnosis_text(bare, UNITS)
+    assert "where: " in text and "follows" not in text and "error in" not in text
+
+
 def test_the_legend_of_the_missing_term_stands_above_it():
     where = diagnosis().where
     swings = replace(where, term=1e-4 * np.cos(3.0 * where.time_s), term_deviation=0 * where.term)
