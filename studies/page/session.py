@@ -12,7 +12,7 @@ from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from studies.page.replay import Action, read_line, recordings_lines
+from studies.page.replay import Action, begin_lines, recordings_lines
 from workbench.errors import InputError, Message
 from workbench.recording import Recording
 from workbench.recording_format import ChannelFormat
@@ -20,6 +20,7 @@ from workbench.rig import Rig, load_rig
 from workbench.rig_writing import rig_text
 
 if TYPE_CHECKING:
+    from studies.page.control_tasks import Linearised, Looped
     from studies.page.plausibility import Finding
     from studies.page.tasks import Accepted, Compared, Diagnosed, Opened
 
@@ -64,6 +65,10 @@ class Session:
     compared: Compared | None = None
     diagnosed: Diagnosed | None = None
     offered: tuple[str, ...] = ()
+    linearised: Linearised | None = None
+    linearised_before: Linearised | None = None
+    looped: Looped | None = None
+    reported: Path | None = None
     actions: tuple[Action, ...] = ()
 
     @property
@@ -109,7 +114,7 @@ def with_rig(session: Session, path: str) -> Session:
         With all that is wrong with the file.
     """
     step = Step(load_rig(Path(path)), path)
-    done = Action("", read_line(path))
+    done = Action("", begin_lines(path))
     return replace(Session((step,)), actions=(*session.actions, done))
 
 
