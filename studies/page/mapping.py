@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,10 +25,13 @@ ABSENT = "(not recorded)"
 
 
 class Mapping:
-    """A line for each signal: the column of the file, and its unit there."""
+    """A line for each signal: the column of the file, and its unit there.
 
-    def __init__(self, page: Page) -> None:
-        self._page = page
+    The file is the one that is looked at, or else the one whose path is typed.
+    """
+
+    def __init__(self, page: Page, typed: Callable[[], str]) -> None:
+        self._page, self._typed = page, typed
         self._widgets: dict[str, tuple[Any, Any]] = {}
         self._shown: Any = None
 
@@ -67,6 +71,7 @@ class Mapping:
         if not self._inner.visible or self._shown is None:
             return
         step, path = self._shown
+        path = path or self._typed()
         known = [str(c.column) for c in step.rig.reader.channels.values()]
         try:
             columns = [*column_names(step.rig, Path(path))] if path else known

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from studies.page.replay import Action, begin_lines, recordings_lines
-from workbench.errors import InputError, Message
+from workbench.errors import InputError, Message, whole_file
 from workbench.recording import Recording
 from workbench.recording_format import ChannelFormat
 from workbench.rig import Rig, load_rig
@@ -116,6 +116,20 @@ def with_rig(session: Session, path: str) -> Session:
     step = Step(load_rig(Path(path)), path)
     done = Action("", begin_lines(path))
     return replace(Session((step,)), actions=(*session.actions, done))
+
+
+def with_plant(session: Session, name: str) -> Session:
+    """A new rig file in this folder, named after a plant of the catalogue; one there is opened."""
+    target = Path(f"{name}.toml")
+    if target.exists():
+        return with_rig(session, str(target))
+    content = f'name = "{name}"\nplant = "{name}"\n'
+    with whole_file(target) as unfinished:
+        unfinished.write_text(content, encoding="utf-8")
+    found = with_rig(session, str(target))
+    write = f"from pathlib import Path\nPath({str(target)!r}).write_text({content!r})\n"
+    last = found.actions[-1]
+    return replace(found, actions=(*found.actions[:-1], Action("", write + last.python)))
 
 
 def with_opened(session: Session, opened: Sequence[Opened], role: Role | None = None) -> Session:
