@@ -145,6 +145,8 @@ def test_columns_mapped_to_signals_are_a_rig_file_that_reads_them(session, folde
 
     (folder / "mapped.toml").write_text(mapped(rig, known))
     assert set(load_rig(folder / "mapped.toml").reader.channels) == set(known)
+    timed = load_rig(mapped(rig, known | {"time": ("t_ms", "ms")}))
+    assert (timed.reader.time.column, timed.reader.time.unit) == ("t_ms", "ms")
     with pytest.raises(InputError, match="does not fit"):
         mapped(rig, known | {"slide.position_m": ("slide.position", "bar")})
 

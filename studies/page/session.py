@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from studies.page.plausibility import Finding
     from studies.page.tasks import Accepted, Compared, Diagnosed, Opened
 
+TIME = "time"  # among the columns of a recording
+
 
 class Role(Enum):
     """What a recording is for."""
@@ -168,7 +170,7 @@ def did(session: Session, action: Action) -> Session:
 
 
 def mapped(rig: Rig, chosen: Mapping[str, tuple[str, str]]) -> str:
-    """The text of a rig file that reads these columns in these units, by full name.
+    """The text of a rig file that reads these columns in these units, by full name or ``time``.
 
     Raises
     ------
@@ -177,13 +179,17 @@ def mapped(rig: Rig, chosen: Mapping[str, tuple[str, str]]) -> str:
     """
     known = rig.reader.channels
     channels = {}
+    time = rig.reader.time
     for name, (column, unit) in chosen.items():
         before = known.get(name)
         number = column.isdigit() and not rig.reader.header
         noise = before.noise if before and before.unit == unit else None
         place = int(column) if number else column
+        if name == TIME:
+            time = replace(time, column=place, unit=unit)
+            continue
         channels[name] = ChannelFormat(place, unit, noise, before.optional if before else False)
-    found = replace(rig, reader=replace(rig.reader, channels=channels))
+    found = replace(rig, reader=replace(rig.reader, time=time, channels=channels))
     content = rig_text(found, Path.cwd())
     load_rig(content)
     return content
