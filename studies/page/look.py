@@ -53,7 +53,7 @@ BUTTON = f"""
 CHOICE = f"""
 :host {{ font: 14px {FONT}; }}
 .bk-btn-group {{ display: flex; flex-wrap: wrap; }}
-.bk-btn-group > * {{ flex: 0 0 auto; }}
+.bk-btn-group .bk-btn {{ flex: 0 0 auto; }}
 .bk-btn {{ font: 14px {FONT}; border: none; border-radius: 0; background: none; color: {SOFT};
            border-bottom: 3px solid transparent; padding: 6px 12px; }}
 .bk-btn.bk-active {{ color: {INK}; font-weight: 600; border: none;
