@@ -23,6 +23,7 @@ from workbench.errors import Message, UnknownNameError, listed, nearest, whole_f
 from workbench.plant import Plant
 from workbench.plant_files import as_it_came, plant_named, plant_text
 from workbench.rig_laws import laws_of, with_laws
+from workbench.units import suffix
 
 
 @dataclass(frozen=True)
@@ -136,8 +137,13 @@ def gains(controller: Controller) -> Iterator[tuple[str, str]]:
     schedule = getattr(controller, "gains", None)
     if schedule is None:
         return
+    axis = getattr(controller, "axis", None)
+    unit = suffix(axis.position if axis else getattr(controller, "signal", "place_m"))
     for way in ("forward", "backward"):
         for place, gain in zip(schedule.positions_m, getattr(schedule, way), strict=True):
             values = (np.round(getattr(gain, f.name), 8) for f in fields(gain))
             words = (f"{f.name} {v}" for f, v in zip(fields(gain), values, strict=True))
-            yield f"{way} at {place:.4g} m", "; ".join(" ".join(word.split()) for word in words)
+            yield (
+                f"{way} at {place:.4g} {unit}",
+                "; ".join(" ".join(word.split()) for word in words),
+            )

@@ -25,7 +25,10 @@ import numpy as np
 
 from controllers.axis import Axis, axis_of
 from controllers.motion import PREVIEW, MotionLimits, motion
+from controllers.ranges import InRanges, ranges_of
+from controllers.spec import ranged
 from controllers.through_valve import ThroughValve, through_valve
+from linearize.modes import HybridModel
 from linearize.reduction import DesignModel, design_model
 from workbench.contracts import Command, Estimate
 from workbench.effects.stribeck_friction import StribeckFriction
@@ -46,6 +49,31 @@ class LinearisingSpec:
     sliding_speed: float = 0.1
     smooth_v: float = 0.01
     limits: MotionLimits = field(default_factory=MotionLimits)
+
+
+@dataclass(frozen=True, kw_only=True)
+class AxisLinearisingSpec:
+    """As :class:`LinearisingSpec`, in ranges of the axis: for any unit; ``sliding`` per second."""
+
+    rate_per_s: float = 50.0
+    integral_share: float = ranged(0.1)
+    sample_time_s: float = 1e-3
+    sliding: float = 0.5
+    smooth_v: float = 0.01
+    motion: InRanges = field(default_factory=InRanges)
+
+    def of(self, wide: float) -> LinearisingSpec:
+        """That of an axis whose range is so wide."""
+        return LinearisingSpec(
+            rate_per_s=self.rate_per_s,
+            integral_share=self.integral_share,
+            sample_time_s=self.sample_time_s,
+            turn_speed=self.motion.turn * wide,
+            turn_per_s=self.motion.turn_per_s,
+            sliding_speed=self.sliding * wide,
+            smooth_v=self.smooth_v,
+            limits=self.motion.limits(wide),
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,6 +153,14 @@ class FeedbackLinearising:
         jerk = ca.jacobian(acceleration, x) @ rates
         one = ca.Function("jerk", [x, u], [jerk])
         return one.map("jerks", "serial", GRID, [0], [])
+
+
+def axis_linearising(
+    hybrid: HybridModel, spec: AxisLinearisingSpec | None = None
+) -> FeedbackLinearising:
+    """The law of the plant of a hybrid model; of its modes it needs none."""
+    ((_, wide),) = ranges_of(hybrid.plant)
+    return feedback_linearising(hybrid.plant, (spec or AxisLinearisingSpec()).of(wide))
 
 
 def feedback_linearising(plant: Plant, spec: LinearisingSpec | None = None) -> FeedbackLinearising:

@@ -21,11 +21,12 @@ from math import inf, pi, tau
 
 import numpy as np
 
+from controllers.axis import Axis
 from controllers.scheduled import Schedule, driven_modes
 from linearize.discrete import sampled
 from linearize.modes import HybridModel, Mode
 from workbench.effects.timing import SensorDelay
-from workbench.effects.valve_command import CommandDelay
+from workbench.effects.valve_command import command_delay_s
 from workbench.plant import Plant
 
 POINTS = 2000  # frequencies from far below the bandwidth to half the sampling rate
@@ -79,10 +80,14 @@ class Margins:
 
 
 def margins(
-    hybrid: HybridModel, laws: Schedule[Law], sample_time_s: float, delay_s: float = 0.0
+    hybrid: HybridModel,
+    laws: Schedule[Law],
+    sample_time_s: float,
+    delay_s: float = 0.0,
+    axis: Axis | None = None,
 ) -> list[Margins]:
     """The margins of every driven mode with its own law, forward then backward."""
-    pairs = zip(driven_modes(hybrid), (laws.forward, laws.backward), strict=True)
+    pairs = zip(driven_modes(hybrid, axis), (laws.forward, laws.backward), strict=True)
     return [
         margins_of(mode, law, sample_time_s, delay_s)
         for modes, side in pairs
@@ -91,14 +96,18 @@ def margins(
 
 
 def loops(
-    hybrid: HybridModel, laws: Schedule[Law], sample_time_s: float, delay_s: float = 0.0
+    hybrid: HybridModel,
+    laws: Schedule[Law],
+    sample_time_s: float,
+    delay_s: float = 0.0,
+    axis: Axis | None = None,
 ) -> dict[str, tuple[np.ndarray, ...]]:
     """Closed loops by driven mode: under its own law, then under those that are mixed into it.
 
     These are the laws of the same place and of both neighbours, for both directions of motion.
     """
     sides, found = (laws.forward, laws.backward), {}
-    for own, modes in enumerate(driven_modes(hybrid)):
+    for own, modes in enumerate(driven_modes(hybrid, axis)):
         for place, mode in enumerate(modes):
             near = slice(max(place - 1, 0), place + 2)
             mixed = [law for side in sides for law in side[near] if law is not sides[own][place]]
@@ -121,8 +130,7 @@ def unforeseen_s(plant: Plant) -> float:
 
 def both_ways_s(plant: Plant) -> float:
     """Delay of commands and sensors together, which a law on the raw measurement meets."""
-    commands = (float(e.delay_s) for e in plant.effects if isinstance(e, CommandDelay))
-    return unforeseen_s(plant) + sum(commands)
+    return unforeseen_s(plant) + command_delay_s(plant.effects)
 
 
 def margins_of(mode: Mode, law: Law, sample_time_s: float, delay_s: float = 0.0) -> Margins:

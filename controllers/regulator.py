@@ -17,6 +17,7 @@ from controllers.axis import Axis, axis_of
 from controllers.lq import Gain, lq_gain
 from controllers.margins import Law, integral_of
 from controllers.motion import PREVIEW, MotionLimits, Sliding, motion, sliding_on
+from controllers.ranges import InRanges, ranges_of
 from controllers.scheduled import Schedule, scheduled
 from controllers.through_valve import ThroughValve, through_valve
 from linearize.modes import HybridModel
@@ -91,8 +92,68 @@ class Regulator:
         return Command(self.valve.sent(limited_v, estimate), kept, notes)
 
 
+@dataclass(frozen=True, kw_only=True)
+class AxisLqSpec:
+    """Weights and clock of a scheduled LQ design, in ranges of the axis: for any unit.
+
+    Attributes
+    ----------
+    position, velocity
+        Tolerable deviations in ranges of the axis, and in ranges per second.
+    pressure_pa, opening_v
+        Tolerable deviations of each pressure and of the opening.
+    integral_time_s, smooth_v
+        As of a :class:`RegulatorSpec`.
+    motion
+        When a reference has jumped, and within which speed the directions are mixed.
+    """
+
+    sample_time_s: float = 1e-3
+    position: float = 0.008
+    velocity: float = 1.0
+    pressure_pa: float = 1e6
+    opening_v: float = 1.0
+    integral_time_s: float = 0.3
+    smooth_v: float = 0.01
+    motion: InRanges = field(default_factory=InRanges)
+
+    def weighed(self, axis: Axis, wide: float) -> RegulatorSpec:
+        """The specification of an axis whose range is so wide."""
+        return RegulatorSpec(
+            tolerable={
+                axis.position: self.position * wide,
+                axis.velocity: self.velocity * wide,
+                **dict.fromkeys(axis.pressures, self.pressure_pa),
+                axis.command: self.opening_v,
+            },
+            integral_time_s=self.integral_time_s,
+            sample_time_s=self.sample_time_s,
+            turn_speed=self.motion.turn * wide,
+            turn_per_s=self.motion.turn_per_s,
+            smooth_v=self.smooth_v,
+            limits=self.motion.limits(wide),
+        )
+
+
+def axis_regulator(hybrid: HybridModel, spec: AxisLqSpec | None = None) -> Regulator:
+    """A regulator of the plant's only axis, from weights in its ranges.
+
+    Raises
+    ------
+    ValueError
+        If a mode cannot be stabilised.
+    """
+    ((axis, wide),) = ranges_of(hybrid.plant)
+    return regulator_on(hybrid, axis, (spec or AxisLqSpec()).weighed(axis, wide))
+
+
 def regulator(hybrid: HybridModel, spec: RegulatorSpec) -> Regulator:
-    """LQ designs on every mode in which the valve drives the motion.
+    """LQ designs on every mode in which the valve drives the plant's only axis; see below."""
+    return regulator_on(hybrid, axis_of(hybrid.plant), spec)
+
+
+def regulator_on(hybrid: HybridModel, axis: Axis, spec: RegulatorSpec) -> Regulator:
+    """LQ designs on every mode in which the axis' valve drives its motion.
 
     Raises
     ------
@@ -101,12 +162,12 @@ def regulator(hybrid: HybridModel, spec: RegulatorSpec) -> Regulator:
     ValueError
         If a mode cannot be stabilised.
     """
-    axis, centre_v = axis_of(hybrid.plant), closed_command(hybrid.plant)
+    centre_v = closed_command(hybrid.plant, axis.command)
     weighed = (spec.tolerable, spec.integral_time_s, spec.sample_time_s)
     return Regulator(
         axis=axis,
         spec=spec,
-        gains=scheduled(hybrid, lambda mode: lq_gain(mode, *weighed)),
-        sliding=scheduled(hybrid, lambda mode: sliding_on(mode, axis, centre_v)),
-        valve=through_valve(hybrid.plant.lean(), spec.smooth_v),
+        gains=scheduled(hybrid, lambda mode: lq_gain(mode, *weighed), axis),
+        sliding=scheduled(hybrid, lambda mode: sliding_on(mode, axis, centre_v), axis),
+        valve=through_valve(hybrid.plant.lean(), spec.smooth_v, axis.command),
     )

@@ -12,7 +12,7 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from controllers.axis import axis_of
+from controllers.axis import Axis, axis_of
 from linearize.analysis import require_controllable
 from linearize.modes import HybridModel, Mode
 from linearize.reduction import closed_command
@@ -62,33 +62,38 @@ def constant(design: Design) -> Schedule[Design]:
     return Schedule(np.zeros(1), (design,), (design,))
 
 
-def driven_modes(hybrid: HybridModel) -> tuple[list[Mode], list[Mode]]:
+def driven_modes(hybrid: HybridModel, axis: Axis | None = None) -> tuple[list[Mode], list[Mode]]:
     """Modes whose valve drives the motion, forward and backward, by rising position.
 
-    Where the command is not cut, that is every mode in which the axis moves.
+    Where the command is not cut, that is every mode in which the axis moves; the plant's only axis
+    unless one is given.
     """
-    axis, sides = axis_of(hybrid.plant), ([], [])
+    axis, sides = axis or axis_of(hybrid.plant), ([], [])
     for mode in hybrid.modes:
+        if axis.velocity not in mode.box:
+            continue
         speed = mode.box[axis.velocity].point
         drive = speed
         if axis.command in mode.box:
-            drive = mode.box[axis.command].point - closed_command(hybrid.plant)
+            drive = mode.box[axis.command].point - closed_command(hybrid.plant, axis.command)
         if speed * drive > 0.0:
             sides[speed < 0.0].append(mode)
     return tuple(sorted(side, key=lambda mode: mode.box[axis.position].point) for side in sides)
 
 
-def scheduled(hybrid: HybridModel, design: Callable[[Mode], Design]) -> Schedule[Design]:
-    """The same design method on every driven mode.
+def scheduled(
+    hybrid: HybridModel, design: Callable[[Mode], Design], axis: Axis | None = None
+) -> Schedule[Design]:
+    """The same design method on every driven mode of the plant's only axis, or of this one.
 
     Raises
     ------
     InputError
         If the command cannot steer one of them.
     """
-    forward, backward = driven_modes(hybrid)
+    axis = axis or axis_of(hybrid.plant)
+    forward, backward = driven_modes(hybrid, axis)
     for mode in (*forward, *backward):
         require_controllable(mode)
-    place = axis_of(hybrid.plant).position
-    points = np.array([mode.box[place].point for mode in forward])
+    points = np.array([mode.box[axis.position].point for mode in forward])
     return Schedule(points, tuple(map(design, forward)), tuple(map(design, backward)))

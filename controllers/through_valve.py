@@ -78,16 +78,20 @@ class ThroughValve:
         return self.lower_v - self.centre_v, self.upper_v - self.centre_v
 
 
-def through_valve(plant: Plant, smooth_v: float) -> ThroughValve:
-    """The valve of a plant with one command."""
-    signal = plant.commands[0]
+def through_valve(plant: Plant, smooth_v: float, command: str | None = None) -> ThroughValve:
+    """The valve of a command of a plant, the first unless named."""
+    signal = next(s for s in plant.commands if command in (None, s.name))
     found = [e for e in plant.effects if isinstance(e, DeadZone) and e.signal == signal.name]
-    lags = [e for e in plant.effects if isinstance(e, ValveLag) and not e.absent]
+    lags = [
+        e
+        for e in plant.effects
+        if isinstance(e, ValveLag) and e.signal == signal.name and not e.absent
+    ]
     return ThroughValve(
-        centre_v=closed_command(plant),
+        centre_v=closed_command(plant, signal.name),
         lower_v=signal.lower,
         upper_v=signal.upper,
-        offset_v=closed_command(plant) - signal.nominal,
+        offset_v=closed_command(plant, signal.name) - signal.nominal,
         dead_zone=found[0] if found else None,
         smooth_v=smooth_v,
         lag=lags[0] if lags else None,

@@ -26,6 +26,7 @@ from controllers.derivative import Derivative, Filter, LowPassDerivative, settle
 from controllers.margins import Law
 from controllers.motion import PREVIEW, MotionLimits, Sliding, motion
 from controllers.scheduled import Schedule
+from controllers.spec import ranged
 from controllers.through_valve import ThroughValve
 from workbench.contracts import Command, Estimate
 
@@ -48,7 +49,7 @@ class PidGains:
 class Dither:
     """A sine on the opening that keeps dry friction moving; none by default."""
 
-    amplitude_v: float = 0.0
+    amplitude_v: float = ranged(0.0)
     frequency_hz: float = 50.0
 
     def at(self, time_s: float) -> float:

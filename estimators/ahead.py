@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from workbench.contracts import Estimate
-from workbench.effects.valve_command import CommandDelay
+from workbench.effects.valve_command import command_delay_s
 from workbench.filtering import consistent_start
 from workbench.plant import Plant
 
@@ -65,8 +65,9 @@ class Ahead:
 
 
 def in_time(estimator: Any, plant: Plant) -> Any:
-    """The estimator itself, or looking ahead where a command of the plant is delayed."""
-    delays = [float(e.delay_s) for e in plant.effects if isinstance(e, CommandDelay)]
-    if sum(delays) == 0.0:
-        return estimator
-    return Ahead(inner=estimator, plant=plant, delay_s=sum(delays))
+    """The estimator itself, or looking ahead where a command of the plant is delayed.
+
+    Of several commands the one that is delayed most counts.
+    """
+    delay_s = command_delay_s(plant.effects)
+    return Ahead(inner=estimator, plant=plant, delay_s=delay_s) if delay_s else estimator

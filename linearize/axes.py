@@ -2,6 +2,8 @@
 
 Speeds, openings and places are *chosen*: sliding is several Stribeck velocities, so that dry
 friction is Coulomb's alone; resting is below the speed of its peak.
+
+Source: physics.md 2.1 to 2.4 (valves, strokes, ranges of the joints) and 4.3.
 """
 
 from __future__ import annotations
@@ -79,6 +81,22 @@ def drive_axis(plant: Plant) -> Axis:
 def rig_axis(plant: Plant) -> Axis:
     """The rod of the rescue robot's rig."""
     return _of(plant, RIG, _ends_m(plant))
+
+
+def travel_axis(plant: Plant) -> Axis:
+    """The one axis of a plant: its slide, its rod or its joint.
+
+    Raises
+    ------
+    ValueError
+        If it has no single one.
+    """
+    if plant.measured[0] == DRIVE.position:
+        return drive_axis(plant)
+    if plant.measured[0] == RIG.position:
+        return rig_axis(plant)
+    (axis,) = joint_axes(plant)
+    return axis
 
 
 def joint_axes(plant: Plant) -> tuple[Axis, ...]:

@@ -1,14 +1,17 @@
-"""The standard modes of each plant: where its signals are cut, and where the points lie."""
+"""The standard modes of each plant: where its signals are cut, and where the points lie.
+
+Source: physics.md 4.2 (gearbox) and 4.3 (all others).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from linearize.axes import DRIVE, drive_axis, joint_axes, rig_axis
+from linearize.axes import DRIVE, drive_axis, joint_axes, rig_axis, travel_axis
 from linearize.cylinder_modes import place_modes
 from linearize.cylinder_modes import regime_modes as modes_by_regime
 from linearize.equilibrium import OperatingPoint
-from linearize.leg_modes import leg_modes
+from linearize.leg_modes import joint_modes, leg_modes, leg_regimes
 from linearize.modes import HybridModel, Interval, hybrid_modes
 from linearize.reduction import DesignModel, design_model
 from linearize.shift_modes import gearbox_modes
@@ -54,11 +57,15 @@ def _crr_rig(plant: Plant) -> HybridModel:
 
 
 def _crr_arm(plant: Plant) -> HybridModel:
-    return place_modes(plant, *joint_axes(plant), design_model(plant))
+    return place_modes(plant, travel_axis(plant), design_model(plant))
 
 
 def _crr_leg(plant: Plant) -> HybridModel:
     return leg_modes(plant, joint_axes(plant))
+
+
+def _crr_leg_regimes(plant: Plant) -> HybridModel:
+    return leg_regimes(plant, joint_axes(plant))
 
 
 def _soft_joint(plant: Plant) -> HybridModel:
@@ -71,6 +78,31 @@ def _servo_reservoir(plant: Plant) -> HybridModel:
 
 SLIDE_MODES: dict[str, Callable[[Plant], HybridModel]] = {"servo_drive": _servo_drive}
 """Plants with a slide behind a proportional valve, which the controllers are designed on."""
+
+
+def _travel(plant: Plant) -> HybridModel:
+    """Friction x place, the axis sliding steadily or resting at each point."""
+    axis = travel_axis(plant)
+    cuts = {axis.velocity: axis.friction_cut(), axis.position: axis.place_cut()}
+    return hybrid_modes(plant, cuts, axis.point)
+
+
+def _joints(plant: Plant) -> HybridModel:
+    return joint_modes(plant, joint_axes(plant))
+
+
+AXIS_MODES: dict[str, Callable[[Plant], HybridModel]] = {
+    **SLIDE_MODES,
+    "crr_rig": _travel,
+    "crr_arm": _travel,
+}
+"""Plants with one axis between two chambers, whatever its units."""
+
+JOINT_MODES: dict[str, Callable[[Plant], HybridModel]] = {"crr_leg": _joints}
+"""Plants with several joints, each with its own cylinder."""
+
+VESSEL_MODES: dict[str, Callable[[Plant], HybridModel]] = {"soft_joint": _soft_joint}
+"""Plants whose pressure is controlled."""
 
 SHIFT_MODES: dict[str, Callable[[Plant], HybridModel]] = {"gearbox": gearbox_modes}
 """Plants that switching valves shift from one dedicated position to another."""
@@ -89,6 +121,7 @@ STANDARD_MODES: dict[str, Callable[[Plant], HybridModel]] = {
 REGIME_MODES: dict[str, Callable[[Plant], HybridModel]] = {
     "servo_drive": _servo_drive_regimes,
     "crr_rig": _crr_rig,
+    "crr_leg": _crr_leg_regimes,
 }
 """Valve x flow regimes x friction x stops, for plants whose standard modes may be fewer."""
 
@@ -124,6 +157,39 @@ def slide_modes(plant: Plant) -> HybridModel:
         If it has no such slide.
     """
     return _among(SLIDE_MODES, plant, "no modes to position a slide with for")
+
+
+def axis_modes(plant: Plant) -> HybridModel:
+    """Modes by direction of sliding and place of a plant with one axis, and its standard modes.
+
+    Raises
+    ------
+    UnknownNameError
+        If it has no such axis.
+    """
+    return _among(AXIS_MODES, plant, "no modes to control one axis with for")
+
+
+def leg_joint_modes(plant: Plant) -> HybridModel:
+    """Modes of each joint of a plant with several, the others at rest.
+
+    Raises
+    ------
+    UnknownNameError
+        If it has no such joints.
+    """
+    return _among(JOINT_MODES, plant, "no modes to control several joints with for")
+
+
+def vessel_modes(plant: Plant) -> HybridModel:
+    """The standard modes of a plant whose pressure is controlled.
+
+    Raises
+    ------
+    UnknownNameError
+        If it has none.
+    """
+    return _among(VESSEL_MODES, plant, "no modes to control a pressure with for")
 
 
 def shift_modes(plant: Plant) -> HybridModel:

@@ -15,8 +15,11 @@ from controllers.design_file import read_design
 from linearize.standard import SHIFT_MODES, SLIDE_MODES
 from studies.closed_loop_check import Check, check
 from studies.closed_loop_figures import check_figures
+from studies.figures.following import following_figures
 from studies.figures.shifts import shift_figures
 from studies.figures.style import styled
+from studies.following import BENCHES
+from studies.following_check import FollowingCheck, check_followed, tasks_of
 from studies.scenarios import SCENARIOS
 from studies.shift_check import SHIFTS, ShiftCheck, check_shifts
 from studies.text import shown
@@ -98,10 +101,46 @@ def check_gears(
     return ShiftCheck(tuple(rows), tuple(records))
 
 
+def follows(rig: Rig) -> bool:
+    """True for a plant that is checked on a bench of its own: rig, arm, leg, soft joint."""
+    return rig.plant.name in BENCHES
+
+
+def check_follower(
+    rig: Rig,
+    designs: Iterable[Path],
+    estimators: Iterable[str],
+    scenarios: Iterable[str] = (),
+    runs: int = 1,
+    progress: Callable[[str], None] = lambda message: None,
+) -> FollowingCheck:
+    """As :func:`check_rig` for a plant with a bench of its own, see :mod:`studies.following`.
+
+    Raises
+    ------
+    InputError
+        If a task or an estimator does not exist, or a design is for another plant.
+    """
+    tasks = tasks_of(rig.plant)
+    names = tuple(scenarios) or tuple(tasks)
+    require(names, tasks, "the list of scenarios")
+    controllers = _controllers(rig, designs)
+    rows, records = [], []
+    for number, plant in enumerate(drawn_plants(rig, runs)):
+        progress(f"closed loop, run {number + 1} of {runs}")
+        found = check_followed(
+            plant, controllers, estimators, names, believed=rig.plant, seed=number
+        )
+        mark = f" {number + 1}" if runs > 1 else ""
+        rows += [replace(row, design=row.design + mark) for row in found.rows]
+        records += found.records
+    return FollowingCheck(tuple(rows), tuple(records))
+
+
 def _controllers(rig: Rig, designs: Iterable[Path]) -> dict[str, Controller]:
     """The controllers of design files by the file's name; warns where they are for other values."""
     name = rig.plant.name
-    known = (*SLIDE_MODES, *SHIFT_MODES)
+    known = (*SLIDE_MODES, *SHIFT_MODES, *BENCHES)
     if name not in known:
         expected = f"a rig of {listed(known)}"
         raise InputError(Message(f"{name} has no standard modes to control", rig.name, expected))
@@ -151,7 +190,9 @@ def drawn(rig: Rig, rng: np.random.Generator) -> Plant:
     return plant.with_values(values)
 
 
-def styled_figures(found: Check | ShiftCheck) -> dict[str, Figure]:
+def styled_figures(found: Check | ShiftCheck | FollowingCheck) -> dict[str, Figure]:
     """The figures of a check in the common style."""
     with styled():
+        if isinstance(found, FollowingCheck):
+            return following_figures(found)
         return shift_figures(found) if isinstance(found, ShiftCheck) else check_figures(found)

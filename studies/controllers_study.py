@@ -1,4 +1,8 @@
-"""Study ``controllers``: what the designs reach on the servo drive against published results."""
+"""Study ``controllers``: what the designs reach on drawn plants.
+
+On the servo drive all of them against published results; on rig, arm, leg and soft joint the best
+one against what is asked of it, see :mod:`studies.followers`.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from studies.followers import (
+    Runs,
+    follower_claims,
+    follower_numbers,
+    follower_runs,
+    follower_text,
+    shares,
+)
 from studies.kept import Kept
 from studies.study import Claim, Extent, Outcome, Study
 from studies.text import columns, number
@@ -56,7 +68,23 @@ def run(folder: Path, extent: Extent, say: Callable[[str], None]) -> Outcome:
                 say(f"{name} with {draw.payload_kg:g} kg, draw {draw.number + 1}")
                 kept.add(key, {"found": _measured(draw, method, numbers)})
             rows.setdefault((name, draw.payload_kg), []).append(kept.rows[key]["found"])
-    return outcome(rows)
+    return together(outcome(rows), follower_runs(kept, DRAWS[extent], say))
+
+
+def together(drive: Outcome, found: Runs) -> Outcome:
+    """What came out on the drive, and on the other plants."""
+    from studies.figures.followers import follower_figure
+
+    drawn = {
+        name: {f"{scenario} {figure}": v for (scenario, figure), v in shares(runs).items()}
+        for name, runs in found.items()
+    }
+    return Outcome(
+        f"{drive.text}\n\n{follower_text(found)}",
+        (*drive.claims, *follower_claims(found)),
+        {**drive.figures, "followers": follower_figure(drawn)},
+        {**drive.numbers, **follower_numbers(found)},
+    )
 
 
 def outcome(rows: Rows) -> Outcome:
@@ -136,7 +164,7 @@ def _text(rows: Rows) -> str:
 
 STUDY = Study(
     name="controllers",
-    question="which design positions the servo drive as well as the best published ones?",
-    source="Zhu and Barth 2010; Bone and Ning 2007; physics.md 2.4",
+    question="which designs position and follow as asked, on plants that they do not know?",
+    source="Zhu and Barth 2010; Bone and Ning 2007; papers 000, 001 and 004; physics.md 2",
     run=run,
 )

@@ -31,6 +31,10 @@ UNSTABLE = (
 SCOPE = (
     "for the sampled loops without limits; while the valve is shut or brakes, nothing is claimed"
 )
+NO_LAWS = (
+    "no margins: the law is the plant's own model, not one linear law per mode; `workbench check` "
+    "says what the whole plant makes of it"
+)
 MOST_PAIRS = 6  # that are named
 
 

@@ -19,6 +19,8 @@ from controllers import CONTROLLERS
 from controllers.spec import replaced
 from linearize.axes import stroke_m
 from linearize.standard import POSITION, PRESSURES, SHIFT_MODES, SLIDE_MODES, SUPPLY
+from studies.following import BENCHES
+from studies.following_check import Followed, tasks_of
 from studies.scenarios import SCENARIOS
 from studies.shift_check import SHIFTS
 from studies.text import number
@@ -57,7 +59,7 @@ SHIFT_LINES = {
 """Likewise of :class:`studies.shift_check.Shift`."""
 
 EVERYWHERE = ("air_kg", "switches")  # all else asks for an end at rest, or for none
-MOVING = ("rmse_m",)
+MOVING = ("rmse_m", "rmse_rad", "largest_error_m", "largest_error_rad")
 
 
 @dataclass(frozen=True)
@@ -80,7 +82,8 @@ class Asked:
 
     def found(self, row: Any, record: LoopRecord) -> float:
         """The figure of a run; NaN where it has none, as the rise of a step that never rose."""
-        return getattr(row, self.figure)
+        figures = row.figures if isinstance(row, Followed) else vars(row)
+        return figures[self.figure] if self.figure in figures else getattr(row, self.figure)
 
     def excess(self, found: float) -> float:
         """How far beyond what is asked: at most 0 where it is met; infinite without a figure."""
@@ -177,7 +180,10 @@ def _known(plant: Plant) -> tuple[Mapping[str, str], dict[str, bool]]:
     if plant.name in SLIDE_MODES:
         stroke = stroke_m(plant)
         return SLIDE_LINES, {name: make(stroke).ends_at_rest for name, make in SCENARIOS.items()}
-    expected = f"a rig of {listed((*SLIDE_MODES, *SHIFT_MODES))}"
+    if plant.name in BENCHES:
+        bench = BENCHES[plant.name]
+        return bench.lines, dict.fromkeys(tasks_of(plant), bench.at_rest)
+    expected = f"a rig of {listed((*SLIDE_MODES, *SHIFT_MODES, *BENCHES))}"
     raise InputError(Message(f"{plant.name} has no standard modes to control", expected=expected))
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from studies.closed_loop_check import Check
 from studies.documents import Document, plain
+from studies.following_check import FollowingCheck
 from studies.shift_check import ShiftCheck
 from studies.specification import Asked, Specification
 from studies.text import columns, shown
@@ -120,7 +121,10 @@ class Judged:
 
 
 def judge(
-    spec: Specification, rig: Rig, found: Check | ShiftCheck, plants: Sequence[Plant]
+    spec: Specification,
+    rig: Rig,
+    found: Check | ShiftCheck | FollowingCheck,
+    plants: Sequence[Plant],
 ) -> Judged:
     """Every line in every scenario that it is judged in, over the runs of a check of one design.
 

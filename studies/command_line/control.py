@@ -24,6 +24,7 @@ from studies.command_line.files import read_all, writable, write_json
 if TYPE_CHECKING:
     from controllers.design_file import Design
     from studies.closed_loop_check import Check
+    from studies.following_check import FollowingCheck
     from studies.shift_check import ShiftCheck
     from studies.specification import Specification
     from studies.verdicts import Judged
@@ -83,13 +84,15 @@ def modes(
         say("linearising")
         hybrid = chosen_modes(known, recordings, number, regimes, cuts)
         regions = () if no_validity else regions_of(hybrid, *limits, say)
-        write_json(json, modes_document(known.name, hybrid, regions))
+        text = modes_text(hybrid, regions)
+        if json:
+            write_json(json, modes_document(known.name, hybrid, regions))
         if export:
             from studies.export import export_modes
 
-            export_modes(hybrid, export, command_text(), regions)
+            export_modes(hybrid, export, command_text(), text)
             say(f"modes in {export}")
-        typer.echo(modes_text(hybrid, regions))
+        typer.echo(text)
 
 
 @app.command(cls=Spread, epilog=example("workbench design rig.toml --controller lq -o lq.toml"))
@@ -100,7 +103,8 @@ def design(
         typer.Option(
             "--controller",
             metavar="METHOD",
-            help="pid, lq, mpc, cascade, nonlinear-mpc; hybrid-mpc.",
+            help="pid, lq, mpc, cascade, nonlinear-mpc for a drive; axis-lq, axis-pid, "
+            "feedback-linearisation for any axis; joint-lq, pressure, hybrid-mpc.",
         ),
     ],
     output: Output,
@@ -149,11 +153,13 @@ def _closed_loop(
     scenarios: Iterable[str],
     runs: int,
     say: Callable[[str], None],
-) -> "Check | ShiftCheck":
+) -> "Check | ShiftCheck | FollowingCheck":
     """A design in the scenarios of its plant; a gearbox brings its own estimator."""
-    from studies.checking import check_gears, check_rig, shifts_gears
+    from studies.checking import check_follower, check_gears, check_rig, follows, shifts_gears
     from workbench.errors import InputError, Message
 
+    if follows(rig):
+        return check_follower(rig, [design], estimators or ["ekf"], scenarios, runs, say)
     if not shifts_gears(rig):
         return check_rig(rig, [design], estimators or ["ekf"], scenarios, runs, say)
     if estimators:
@@ -166,13 +172,18 @@ def _certify(found: "Design", say: Callable[[str], None]) -> None:
     """Print the margins of each mode, and what is certified across modes."""
     from controllers.certificate import certificate
     from controllers.margins import loops, margins, unforeseen_s
-    from studies.design_text import certificate_text, margins_text
+    from studies.design_text import NO_LAWS, certificate_text, margins_text
 
     made, delay_s = found.controller, unforeseen_s(found.plant)
-    loop = (found.hybrid, made.laws, made.sample_time_s, delay_s)
-    typer.echo(margins_text(margins(*loop), delay_s))
-    say("looking for a certificate across modes")
-    typer.echo(certificate_text(certificate(loops(*loop), made.sample_time_s)))
+    if not hasattr(made, "laws") and not hasattr(made, "regulators"):
+        typer.echo(NO_LAWS)
+        return
+    for part in getattr(made, "regulators", (made,)):
+        axis = getattr(part, "axis", None)
+        loop = (found.hybrid, part.laws, made.sample_time_s, delay_s, axis)
+        typer.echo(margins_text(margins(*loop), delay_s))
+        say("looking for a certificate across modes")
+        typer.echo(certificate_text(certificate(loops(*loop), made.sample_time_s)))
 
 
 @app.command(cls=Spread, epilog=example(CHECK))
@@ -187,7 +198,9 @@ def check(
     ] = None,
     scenario: Annotated[
         list[str] | None,
-        typer.Option("--scenario", metavar="NAME", help="step, sine; n-h, h-n, n-l, l-n; all."),
+        typer.Option(
+            "--scenario", metavar="NAME", help="step, sine; n-h, h-n, ...; as named; all."
+        ),
     ] = None,
     runs: Several = 1,
     spec: Spec = None,
@@ -250,7 +263,9 @@ def _tell_missed(judged: "Judged") -> None:
         typer.echo(f"out of specification: {', '.join(judged.missed)}", err=True)
 
 
-def _judged(asked: "Specification", rig: "Rig", found: "Check | ShiftCheck", runs: int) -> "Judged":
+def _judged(
+    asked: "Specification", rig: "Rig", found: "Check | ShiftCheck | FollowingCheck", runs: int
+) -> "Judged":
     from studies.checking import drawn_plants
     from studies.verdicts import judge
 

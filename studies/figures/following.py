@@ -1,0 +1,75 @@
+"""Figures of a plant that follows a reference: each signal, its error, and the commands."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from studies.figures.style import GREY, PAGE_IN, new_figure
+from studies.following_check import FollowingCheck
+from studies.text import labelled
+from workbench.units import display_scale, display_unit
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from workbench.closed_loop import LoopRecord
+
+REFERENCE = "reference."
+ROW_IN = 1.3
+
+
+def following_figures(found: FollowingCheck) -> dict[str, Figure]:
+    """One figure per scenario, by file name without ending; a line per design and estimator."""
+    figures = {}
+    for scenario in dict.fromkeys(row.scenario for row in found.rows):
+        runs = {
+            f"{row.design}, {row.estimator}": record
+            for row, record in zip(found.rows, found.records, strict=True)
+            if row.scenario == scenario
+        }
+        figures[f"following_{scenario}"] = _figure(runs)
+    return figures
+
+
+def _figure(runs: dict[str, LoopRecord]) -> Figure:
+    first = next(iter(runs.values())).recording
+    followed = [n.removeprefix(REFERENCE) for n in first.channels if n.startswith(REFERENCE)]
+    commands = [n for n in first.channels if n.startswith("valve")]
+    number = 2 * len(followed) + len(commands)
+    figure = new_figure(PAGE_IN, 0.6 + ROW_IN * number)
+    panels = figure.subplots(number, sharex=True)
+    for k, name in enumerate(followed):
+        _draw_signal(panels[2 * k], runs, name)
+        _draw_error(panels[2 * k + 1], runs, name)
+    for axes, name in zip(panels[2 * len(followed) :], commands, strict=True):
+        for run, record in runs.items():
+            axes.step(first.time_s, record.recording[name], where="post", label=run)
+        axes.set_ylabel(_lines(labelled(name)))
+    panels[-1].set_xlabel("time (s)")
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
+    return figure
+
+
+def _draw_signal(axes: Axes, runs: dict[str, LoopRecord], name: str) -> None:
+    for k, (run, record) in enumerate(runs.items()):
+        recording, unit = record.recording, display_scale(name)
+        if k == 0:
+            wanted = unit.from_si(recording[REFERENCE + name])
+            axes.plot(recording.time_s, wanted, color=GREY, linestyle="-", label="reference")
+        axes.plot(recording.time_s, unit.from_si(recording[name]), color=f"C{k}", label=run)
+    axes.set_ylabel(_lines(labelled(name)))
+
+
+def _draw_error(axes: Axes, runs: dict[str, LoopRecord], name: str) -> None:
+    for k, (run, record) in enumerate(runs.items()):
+        recording = record.recording
+        error = (recording[name] - recording[REFERENCE + name]) / display_scale(name).factor
+        axes.plot(recording.time_s, error, color=f"C{k}", label=run)
+    axes.set_ylabel(f"error\n({display_unit(name)})")
+
+
+def _lines(label: str) -> str:
+    """The unit below the words."""
+    words, bracket, unit = label.rpartition(" (")
+    return f"{words}\n({unit}" if bracket else label
