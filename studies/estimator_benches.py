@@ -36,9 +36,6 @@ SENSORS = {  # noise and grid of physics.md section 2 together
 CORNER_HZ, FORCE_N = 20.0, 1.0  # of the process disturbance, physics.md section 2
 FLOW_KG_S = 0.005 * 25.7e-3
 NUMERICAL = {VELOCITY: 2e-3, **dict.fromkeys(OUTPUTS[1:], 50.0)}  # two integrators differ
-# What closed loops use.  With less, half of the runs that start half a bar off are lost: a filter
-# that is sure of the speed puts the surprise of the first break-away into the pressures.
-BREAKING_AWAY = {VELOCITY: 0.1}
 AT_REST = {  # deviations of a drive that stands at room temperature
     "slide.position_m": 2e-5,
     VELOCITY: 2e-3,

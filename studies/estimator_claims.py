@@ -63,7 +63,7 @@ def position_claims(
 ) -> Iterator[Claim]:
     worst = max(max(row["a"], row["b"]) for row in alone)
     yield Claim(
-        "servo_drive, position alone: pressures in motion within 0.15 bar",
+        "servo_drive, UKF by position alone: pressures in motion within 0.15 bar",
         f"{1e-5 * worst:.3f} bar RMS in the worst of {len(alone)} runs",
         worst < NEAR_PA,
     )
