@@ -50,7 +50,8 @@ endif
 # The oldest Python is named, or uv would lock for the one at hand and newer only.
 lock:
 	@uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url \
-	  --custom-compile-command "make lock" --extra test --extra build \
+	  --custom-compile-command "make lock" \
+	  --extra build --extra cluster --extra page --extra test \
 	  pyproject.toml -o requirements.lock
 	@echo ziglang | uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
 	  --no-emit-index-url --custom-compile-command "make lock" - -o compiler.lock

@@ -2,44 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
+from estimators.stochastic_plant import StochasticPlant
 from workbench.contracts import Estimate
 from workbench.filter_update import FilterUpdate
 from workbench.filtering import consistent_start
-from workbench.plant import Plant
 from workbench.plant_filter import PlantFilter
 
 
 @dataclass(frozen=True, kw_only=True)
-class ExtendedKalman:
+class ExtendedKalman(StochasticPlant):
     """Predict with the plant, correct with its Jacobian; see :class:`PlantFilter`.
 
     The notes hold the normalised innovation squared of a sample, ``nis``, of as many degrees of
     freedom as outputs were ``received``, and each unknown input.
-
-    Attributes
-    ----------
-    measurement_noise
-        Standard deviation by output.
-    process_noise
-        Standard deviation that a state gains per square root of a second.
-    unknown_inputs
-        The same for an unknown rate of a state; its estimate stands in the notes.
-    initial_deviation
-        Standard deviation at the start by state, the plant's scale by default.
     """
-
-    plant: Plant
-    sample_time_s: float
-    measurement_noise: Mapping[str, float]
-    process_noise: Mapping[str, float]
-    unknown_inputs: Mapping[str, float] = field(default_factory=dict)
-    initial_deviation: Mapping[str, float] = field(default_factory=dict)
 
     def start(self, measurement: np.ndarray) -> Estimate:
         found = self.filter
@@ -78,11 +59,4 @@ class ExtendedKalman:
     @cached_property
     def filter(self) -> PlantFilter:
         """The filter whose functions are called."""
-        return PlantFilter(
-            plant=self.plant,
-            sample_time_s=self.sample_time_s,
-            measurement_noise=self.measurement_noise,
-            process_noise=self.process_noise,
-            unknown_inputs=self.unknown_inputs,
-            initial_deviation=self.initial_deviation,
-        )
+        return PlantFilter(**self.assumed)

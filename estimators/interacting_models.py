@@ -17,14 +17,14 @@ Markovian switching coefficients"; Bar-Shalom, Li and Kirubarajan 2001, Sec. 11.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from estimators.extended_kalman import ExtendedKalman
 from estimators.regimes import regimes
+from estimators.stochastic_plant import StochasticPlant
 from workbench.contracts import Estimate
 from workbench.plant import Plant
 
@@ -53,27 +53,20 @@ def combined(X: np.ndarray, P: np.ndarray, weights: np.ndarray) -> tuple[np.ndar
 
 
 @dataclass(frozen=True, kw_only=True)
-class InteractingModels:
+class InteractingModels(StochasticPlant):
     """One extended filter per regime of the plant, and how likely each regime is.
 
-    The notes hold the probability of each regime.
+    The notes hold the probability of each regime.  Noise of states that the regimes leave out is
+    passed over.
 
     Attributes
     ----------
-    measurement_noise, process_noise, unknown_inputs, initial_deviation
-        As in :class:`ExtendedKalman`; noise of states that the regimes leave out is passed over.
     dwell_s
         Mean time for which a regime lasts; all others are as likely to follow.
     creep
         What a held position gains per square root of a second, in units of its scale: presliding.
     """
 
-    plant: Plant
-    sample_time_s: float
-    measurement_noise: Mapping[str, float]
-    process_noise: Mapping[str, float]
-    unknown_inputs: Mapping[str, float] = field(default_factory=dict)
-    initial_deviation: Mapping[str, float] = field(default_factory=dict)
     dwell_s: float = 0.05
     creep: float = 1e-3
 

@@ -30,8 +30,9 @@ from estimators.extended_kalman import ExtendedKalman
 from estimators.horizon import Horizon
 from estimators.losses import Loss, Squared
 from estimators.nearest_inside import OutsideError, nearest_inside
+from estimators.stochastic_plant import StochasticPlant
 from workbench.contracts import Estimate
-from workbench.plant import Plant, require
+from workbench.plant import require
 from workbench.rosenbrock import COARSEST_STEP_S
 
 HALVINGS = 4
@@ -42,6 +43,11 @@ GROWTH, ROUNDING = 1e-3, 1e-9  # share and size by which a step may raise the co
 def allowed(cost: float) -> float:
     """The highest cost that a step may lead to from this one."""
     return cost * (1.0 + GROWTH) + ROUNDING
+
+
+def sound(P: np.ndarray) -> bool:
+    """Variances that can be: finite, and below zero only by rounding."""
+    return all(-(ROUNDING**2) <= variance < inf for variance in P.diagonal().tolist())
 
 
 class LostError(ArithmeticError):
@@ -67,13 +73,13 @@ class Step:
 
 
 @dataclass(frozen=True, kw_only=True)
-class MovingHorizon:
+class MovingHorizon(StochasticPlant):
     """An estimator that looks back over ``horizon`` samples; see the module.
+
+    In the window, too, states and unknown inputs wander by their noise.
 
     Attributes
     ----------
-    measurement_noise, process_noise, unknown_inputs
-        As in :class:`ExtendedKalman`; in the window, too, states and unknown inputs wander so.
     constants
         Parameters that are one value over the window, by ``part.parameter_unit``, with the standard
         deviation of their movement from one sample to the next: the smaller, the dearer.
@@ -101,11 +107,6 @@ class MovingHorizon:
         For names that the plant does not have.
     """
 
-    plant: Plant
-    sample_time_s: float
-    measurement_noise: Mapping[str, float]
-    process_noise: Mapping[str, float]
-    unknown_inputs: Mapping[str, float] = field(default_factory=dict)
     constants: Mapping[str, float] = field(default_factory=dict)
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     loss: Loss = Squared()
@@ -158,13 +159,8 @@ class MovingHorizon:
         """The filter that starts the window and takes over; to it constants are random walks."""
         per_s = self.sample_time_s**-0.5
         walks = {name: movement * per_s for name, movement in self.constants.items()}
-        return ExtendedKalman(
-            plant=self.plant,
-            sample_time_s=self.sample_time_s,
-            measurement_noise=self.measurement_noise,
-            process_noise=self.process_noise,
-            unknown_inputs={**self.unknown_inputs, **walks},
-        )
+        unknown = {**self.unknown_inputs, **walks}
+        return ExtendedKalman(**self.assumed | {"unknown_inputs": unknown})
 
     @cached_property
     def functions(self) -> Horizon:
@@ -212,7 +208,8 @@ class MovingHorizon:
         tape, told = self.functions.sample(window.tape, news, d, p)
         step = self._accepted(tape, told[1:], told[0])
         if step is None:
-            step = self._searched(self.functions.move(window.tape, news, d, p)[0])
+            failed = not told[1] <= allowed(told[0])
+            step = self._searched(self.functions.move(window.tape, news, d, p)[0], failed)
         for _ in range(self.passes - 1):
             if perf_counter() - begun > self.deadline_s:
                 break
@@ -222,16 +219,17 @@ class MovingHorizon:
     def _accepted(self, tape: np.ndarray, told: np.ndarray, before: float) -> Step | None:
         """The full step where it lowers the cost inside the bounds; else it is to be searched."""
         X = self.functions.part(tape, "points")[:, -1]
-        if (
-            not told[0] <= before * (1.0 + ROUNDING) + ROUNDING
-        ):  # false, too, where it is not finite
+        if not told[0] <= allowed(before):  # true, too, where it is not finite
             return None
         if self.bounds and not ((self._limits[0] <= X) & (self._limits[1] >= X)).all():
             return None
-        return Step(Window(tape, X, self._square(told[1 + len(X) :])), 1.0, False)
+        P = self._square(told[1 + len(X) :])
+        return Step(Window(tape, X, P), 1.0, False) if sound(P) else None
 
-    def _searched(self, tape: np.ndarray) -> Step:
+    def _searched(self, tape: np.ndarray, full_failed: bool = False) -> Step:
         """The longest of the halved steps that lowers the cost, held inside the bounds.
+
+        A full step that is known to fail is not tried again, unless bounds shorten it.
 
         Raises
         ------
@@ -242,8 +240,8 @@ class MovingHorizon:
         functions, (lower, upper), n = self.functions, self._limits, len(self._names)
         aim, told = functions.solve(tape, np.zeros(n))
         before, newest, P = told[0], told[1 : n + 1], self._square(told[n + 1 :])
-        if not np.isfinite(told).all():
-            raise LostError("the linear problem is not finite")
+        if not (np.isfinite(told).all() and sound(P)):
+            raise LostError("the linear problem is not finite, or its variances are below zero")
         at = functions.part(tape, "points")[:, -1]
         if ((at < lower) | (at > upper)).any():  # to come back inside may cost anything
             before = inf
@@ -251,7 +249,8 @@ class MovingHorizon:
         if bounded:
             _, push = nearest_inside(newest, P, lower - at, upper - at)
             aim, _ = functions.solve(tape, push)
-        for k in range(HALVINGS + 1):
+        first = 1 if full_failed and not bounded and np.isfinite(before) else 0
+        for k in range(first, HALVINGS + 1):
             length = 0.5**k
             tried, after = functions.run(tape + length * (aim - tape), d, p)
             if after[0] <= allowed(before):

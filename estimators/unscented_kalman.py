@@ -15,8 +15,7 @@ for points and weights; Särkkä 2013, "Bayesian filtering and smoothing", algor
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -24,25 +23,22 @@ import casadi as ca
 import numpy as np
 
 from estimators.extended_kalman import ExtendedKalman
+from estimators.stochastic_plant import StochasticPlant
 from workbench.contracts import Estimate
-from workbench.plant import Plant
 
 CENTRE, NORMAL = 2.0, 0.0  # beta for a normal distribution, kappa
 
 
 @dataclass(frozen=True, kw_only=True)
-class UnscentedKalman:
-    """See the module; the fields are those of :class:`ExtendedKalman`.
+class UnscentedKalman(StochasticPlant):
+    """See the module.
 
-    ``spread`` is Merwe's alpha: points lie alpha sqrt(n) standard deviations from the mean.
+    Attributes
+    ----------
+    spread
+        Merwe's alpha: points lie alpha sqrt(n) standard deviations from the mean.
     """
 
-    plant: Plant
-    sample_time_s: float
-    measurement_noise: Mapping[str, float]
-    process_noise: Mapping[str, float]
-    unknown_inputs: Mapping[str, float] = field(default_factory=dict)
-    initial_deviation: Mapping[str, float] = field(default_factory=dict)
     spread: float = 0.3
 
     def start(self, measurement: np.ndarray) -> Estimate:
@@ -106,14 +102,7 @@ class UnscentedKalman:
     @cached_property
     def extended(self) -> ExtendedKalman:
         """The filter that starts, holds the noise, and takes over where a point is lost."""
-        return ExtendedKalman(
-            plant=self.plant,
-            sample_time_s=self.sample_time_s,
-            measurement_noise=self.measurement_noise,
-            process_noise=self.process_noise,
-            unknown_inputs=self.unknown_inputs,
-            initial_deviation=self.initial_deviation,
-        )
+        return ExtendedKalman(**self.assumed)
 
     @cached_property
     def _free(self) -> np.ndarray:

@@ -51,17 +51,17 @@ class WindowNodes:
         """(X, noise, moved, u, d, p) -> (X, F) one sample later.
 
         ``noise`` is (a, b) of :mod:`estimators.horizon`; where ``moved`` is 0, X stays and F is the
-        unit matrix.  Steps whose error is too large are done again in finer ones, for X; F is that
-        of the coarse ones.
+        unit matrix.  Steps whose error is too large, as at an impact, are done again in finer ones;
+        F is then that of the extended filter, which is damped where the step's would explode.
         """
         trial = self._trial
         symbols = [ca.MX.sym(f"i{k}", *trial.size_in(k)) for k in range(trial.n_in())]
         X, F = ca.MX.sym("X", self.n), ca.MX.sym("F", self.n, self.n)
-        keep = ca.Function("keep", [X, *symbols], [X])
-        again = ca.Function("again", [X, *symbols], [self._refined(*symbols)])
+        keep = ca.Function("keep", [X, F, *symbols], [X, F])
+        again = ca.Function("again", [X, F, *symbols], self._refined(*symbols))
         X, F, passes = trial(*symbols)
-        X = ca.Function.if_else("chosen", keep, again)(passes, X, *symbols)
-        return ca.Function("advance", symbols, [X, F])
+        results = ca.Function.if_else("chosen", keep, again)(passes, X, F, *symbols)
+        return ca.Function("advance", symbols, results)
 
     @cached_property
     def _trial(self) -> ca.Function:
@@ -77,7 +77,7 @@ class WindowNodes:
         kind = ca.SX if steps == 1 else ca.MX  # several are a chain of calls, or the code is long
         X, noise, moved, u, d, p, kicked = self._inputs(kind)
         real = ca.DM(self.found.scale) * kicked
-        now, w, passes, carried = real[:n_x], real[n_x:], 1.0, None
+        now, w, passes, carried = real[:n_x], real[n_x:, 0], 1.0, None
         for _ in range(steps):
             now, by_x, by_w, small = once(now, u, d, ca.vertcat(p, w))
             passes = passes * small
@@ -110,15 +110,16 @@ class WindowNodes:
 
     @cached_property
     def _refined(self) -> ca.Function:
-        """(X, noise, moved, u, d, p) -> X with as fine steps as it takes."""
+        """(X, noise, moved, u, d, p) -> (X with as fine steps as it takes, F)."""
         n_x, S = len(self.found.plant.scale), ca.DM(self.found.scale)
         X, noise, moved, u, d, p, kicked = self._inputs(ca.MX)
         real = S * kicked
         dt, tolerances = self.found.sample_time_s, self.found.plant.model.tolerances
         step = controlled_step(*self._rates, dt, tolerances, self.coarsest_s)
-        later = ca.vertcat(step(real[:n_x], u, d, ca.vertcat(p, real[n_x:])), real[n_x:])
+        later = ca.vertcat(step(real[:n_x], u, d, ca.vertcat(p, real[n_x:, 0])), real[n_x:, 0])
         ahead = later / S + moved * ca.DM(self.kick) * noise[self.n :]
-        results = [moved * ahead + (1.0 - moved) * X]
+        F = moved * self.found.transition(kicked, u, d, p) + (1.0 - moved) * ca.MX.eye(self.n)
+        results = [moved * ahead + (1.0 - moved) * X, ca.densify(F)]
         return ca.Function("refined", [X, noise, moved, u, d, p], results)
 
     @cached_property
@@ -128,7 +129,7 @@ class WindowNodes:
         X = ca.SX.sym("X", self.n)
         real = ca.SX(ca.DM(self.found.scale)) * X
         x, u, d, p = model.symbols
-        now = p + ca.SX(ca.DM(self._walking)) @ real[n_x:]
+        now = p + ca.SX(ca.DM(self._walking)) @ real[n_x:, 0]
         (y,) = ca.substitute([model.outputs], [x, p], [real[:n_x], now])
         noise = [self.found.measurement_noise[name] for name in model.measured]
         y = y / ca.DM(noise)

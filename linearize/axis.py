@@ -1,4 +1,9 @@
-"""What moves, and the cylinder that drives it: how its range is cut, and where its modes lie."""
+"""What moves, and the cylinder that drives it: how its range is cut, and where its modes lie.
+
+All values are in the units of the signals that are named: m or rad, m/s or rad/s, V.
+
+Source: physics.md 4.3.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""Operating points: values that make chosen rates vanish, and how far from rest they are."""
+"""Operating points: values that make chosen rates vanish, and how far from rest they are.
+
+Source: Newton's method with ever shorter steps, Dennis and Schnabel 1983, "Numerical Methods for
+Unconstrained Optimization and Nonlinear Equations", Ch. 6.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from linearize.reduction import DesignModel
+from workbench.errors import listed
 from workbench.plant import require
 
 STEPS, TOLERANCE = 60, 1e-9
@@ -70,7 +75,11 @@ def operating_point(
         move = np.clip(-np.linalg.lstsq(slope, left, rcond=None)[0], -1.0, 1.0) * size
         values, left = _shortened(values, columns, move, left, residual, rows)
     if np.abs(left).max(initial=0.0) > 1e3 * TOLERANCE:
-        raise ValueError(f"no operating point of {model.plant.name} at {dict(given)}")
+        at = listed([f"{name} {value:.4g}" for name, value in given.items()]) or "any state"
+        still = " and ".join(part for part in (", ".join(vanish[:-1]), vanish[-1]) if part)
+        raise ValueError(
+            f"{model.plant.name}: no operating point at {at} where {still} stand still"
+        )
     rates = residual(values)
     return OperatingPoint(values[:n], values[n:], rates * model.scale, float(np.abs(rates).max()))
 

@@ -1,15 +1,17 @@
 """What a mode holds, and when it lets go: dry friction at rest, a stop that carries.
 
 Held states come in pairs, a position and its velocity: the velocity is zero and the position
-stays.  A mode that brings guards of its own says by them when it ends.  For any other, the signal
-whose interval holds is let go upwards when its rate points upwards everywhere just above the
-interval, downwards when it points downwards everywhere just below,
+stays.  A mode that holds at a place, a stop or Neutral, says by guards of its own when it ends.  In
+any other, the signal whose interval holds is let go upwards when its rate points upwards everywhere
+just above the interval, downwards when it points downwards everywhere just below,
 
     min over s of f_s(x, u; s) > 0,   max over s of f_s(x, u; s) < 0,
 
 with s between the interval and the next point of a mode, and f_s without what is viscous.  Of a
 slide with Stribeck friction the least lies at the peak of static friction.  Both are affine in
 (x, u), as the modes are: f_s is linearised where it is least.
+
+Source: Karnopp 1985 (a velocity that rests, and the force that ends it).
 """
 
 from __future__ import annotations
@@ -53,9 +55,7 @@ class Hold:
 
 
 def holds_of(hybrid: HybridModel, mode: Mode) -> tuple[Hold, ...]:
-    """How a mode is left that holds velocities; none where guards of its own say so."""
-    if mode.guards:
-        return ()
+    """How a mode is left in whose box velocities rest; guards say so where a place is held."""
     resting = resting_states(hybrid, mode)
     cut = {s: r for s, r in mode.box.items() if s in resting and isinstance(r, Interval)}
     return tuple(_hold(hybrid, mode, signal, region) for signal, region in cut.items())
@@ -108,9 +108,9 @@ def least_rate(
 ) -> np.ndarray:
     """The rate of a signal where it points outwards least, as a row over (x, u, 1).
 
-    ``probes`` are values of the signal in ``column`` that are tried at a point (x, u), the side
-    outwards is 1 or -1.  What hinders in proportion to the signal, by its slope at the last probe,
-    does not count: viscous friction holds nothing.
+    ``probes``, (n,), are values of the signal in ``column`` that are tried at a point (x, u), shape
+    (n_x + n_u,); the side outwards is 1 or -1.  What hinders in proportion to the signal, by its
+    slope at the last probe, does not count: viscous friction holds nothing.
     """
     n = len(model.states)
     around = np.tile(point[:, None], len(probes))

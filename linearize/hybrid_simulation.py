@@ -3,18 +3,23 @@
 Inside a mode the state goes by x[k+1] = F x[k] + G u[k] + offset.  The mode is looked up at every
 sample, which is when a controller would look too.
 
+Jumps.  A piston that picks up another one shares its momentum with it, within the sample in which
+they meet; see :class:`linearize.cuts.Jump`.
+
 Sticking.  A mode that holds states stands for dry friction or for a stop: the velocity is zero,
 the position stays.  :mod:`linearize.holding` says when it lets go, so that a slide breaks away when
 pressure overcomes the peak of static friction.  A velocity that would jump across its holding
 interval within one sample stops in it.
 
-Source: Karnopp 1985 (zero velocity as an interval, break-away by force); physics.md 4.2, 4.3.
+Source: Karnopp 1985 (zero velocity as an interval, break-away by force); Goebel, Sanfelice, Teel
+2009, "Hybrid dynamical systems" (jumps of the state); physics.md 4.2, 4.3.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -75,7 +80,7 @@ class SampledHybrid:
             z = np.column_stack([x, np.broadcast_to(now, (len(x), u.shape[2])), np.ones(len(x))])
             states[k], modes[k] = x, self.active(z)
             later = np.einsum("wij,wj->wi", self.steps[modes[k]], z)
-            x = self.stopped(x, later)
+            x = self.jumped(x, self.stopped(x, later))
         states = states.transpose(2, 0, 1)
         return HybridRun(states[..., 0], modes[:, 0]) if single else HybridRun(states, modes)
 
@@ -86,10 +91,12 @@ class SampledHybrid:
         """
         signals = z[:, self.columns]
         found = self._boxed(z, signals)
-        for k, holds in self.holds.items():
+        k = -1
+        while (ahead := found[(found > k) & self._holding[found]]).size:
+            k = ahead.min()
             here = np.flatnonzero(found == k)
             gone = np.zeros(len(here), dtype=bool)
-            for hold in holds:
+            for hold in self.holds[k]:
                 side = hold.side(z[here])
                 column = np.flatnonzero(self.columns == hold.column)
                 outside = np.where(side > 0, hold.above, hold.below)[side != 0]
@@ -113,13 +120,30 @@ class SampledHybrid:
         return covered.argmax(axis=1)
 
     def stopped(self, x: np.ndarray, later: np.ndarray) -> np.ndarray:
-        """Later states, inside of a holding interval where a step would jump across it."""
-        intervals = {hold.interval for holds in self.holds.values() for hold in holds}
-        for column, below, above, inside in intervals:
+        """Later states, (n_w, n_x), inside of a holding interval that a step would jump across."""
+        for column, below, above, inside in self._intervals:
             fell = (x[:, column] >= above) & (later[:, column] <= below)
             rose = (x[:, column] <= below) & (later[:, column] >= above)
             later[fell | rose, column] = inside
         return later
+
+    def jumped(self, x: np.ndarray, later: np.ndarray) -> np.ndarray:
+        """Later states, (n_w, n_x), after what jumps where a signal rises to its value."""
+        model = self.hybrid.model
+        for jump in self.hybrid.jumps:
+            signal, state = model.states.index(jump.signal), model.states.index(jump.state)
+            met = (x[:, signal] < jump.at) & (later[:, signal] >= jump.at)
+            later[met, state] *= jump.ratio
+        return later
+
+    @cached_property
+    def _holding(self) -> np.ndarray:
+        """Which modes hold something that may let go, shape (n_modes,)."""
+        return np.isin(np.arange(len(self.hybrid.modes)), [*self.holds])
+
+    @cached_property
+    def _intervals(self) -> set[tuple[int, float, float, float]]:
+        return {hold.interval for holds in self.holds.values() for hold in holds}
 
 
 def sampled_hybrid(hybrid: HybridModel, sample_time_s: float) -> SampledHybrid:
@@ -169,7 +193,10 @@ def _guards(modes: Sequence[Mode], names: tuple[str, ...]) -> np.ndarray:
 
 
 def whole_step(hybrid: HybridModel, mode: Mode, sample_time_s: float) -> np.ndarray:
-    """[F G offset] over all states and commands: what the mode holds stays, its rates are zero."""
+    """[F G offset] over all states and commands, shape (n_x, n_x + n_u + 1).
+
+    What the mode holds stays, its rates are zero.
+    """
     step, model = sampled(mode, sample_time_s), hybrid.model
     names = (*model.states, *model.commands)
     kept = [names.index(name) for name in mode.state_names]

@@ -75,6 +75,14 @@ def no_modes(hybrid: HybridModel) -> str:
     return _told(hybrid.no_modes)
 
 
+def jumps(hybrid: HybridModel) -> str:
+    """What changes at once between modes, one line each."""
+    return "\n".join(
+        f"{jump.state} is multiplied by {jump.ratio:.4g} where {jump.signal} rises to {jump.at:g}"
+        for jump in hybrid.jumps
+    )
+
+
 def _told(items: Iterable[LeftOut]) -> str:
     return "\n".join(f"{item.what}: {item.instead} ({item.reason})" for item in items)
 

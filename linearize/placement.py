@@ -170,9 +170,9 @@ def placed_modes(
 ) -> HybridModel:
     """So many modes of a plant, placed where a manoeuvre goes.
 
-    ``hybrid`` tells the plant and which intervals hold states; of its other cuts only those of the
-    XX
-    holds where the manoeuvre never goes keeps the mode, and the point, that it has there.
+    ``hybrid`` tells the plant, its jumps, and which intervals hold states; of its other cuts only
+    the levels of switches and the signals that somewhere hold states stay.  What holds where
+    the manoeuvre never goes keeps the mode, and the point, that it has there.
 
     Raises
     ------
@@ -200,7 +200,7 @@ def growing_modes(hybrid: HybridModel, seen: Visited, most: int = SAMPLES) -> It
     modes = [samples.mode(region) for region in regions]
     splits = [samples.best_split(region) for region in regions]
     while True:
-        yield HybridModel(hybrid.plant, hybrid.model, _named(modes))
+        yield replace(hybrid, modes=_named(modes))
         k = int(np.argmax([split.gain for split in splits]))
         if splits[k].gain <= 0.0:
             return

@@ -17,7 +17,7 @@ import casadi as ca
 import numpy as np
 
 from linearize.axis import Travel
-from linearize.cuts import Guard, Interval, Level, Region
+from linearize.cuts import Guard, Interval, Jump, Level, Region
 from linearize.equilibrium import OperatingPoint, operating_point
 from linearize.modes import (
     Box,
@@ -35,6 +35,7 @@ from linearize.shifting import (
     POSITION,
     PRESSURES,
     VELOCITY,
+    carried_share,
     driving_model,
     shift_model,
     switched_shift_model,
@@ -101,7 +102,8 @@ def gearbox_modes(
             Interval(f"{number + 1} {charges}", 0.0, inf, into_kg_s),
         )
     hybrid = hybrid_modes(plant, cuts, _placing(FLOWS, points), model)
-    return replace(hybrid, modes=(held_at_neutral(model, points), *hybrid.modes))
+    modes = (held_at_neutral(model, points), *hybrid.modes)
+    return replace(hybrid, modes=modes, jumps=picked_up(model))
 
 
 def switched_modes(
@@ -116,7 +118,8 @@ def switched_modes(
     """
     points, model = points or ShiftPoints(), model or switched_shift_model(plant)
     cuts = {POSITION: side_cut(model, pieces), **valve_cut(points)}
-    return hybrid_modes(plant, cuts, _placing(COMMANDS, points), model)
+    made = hybrid_modes(plant, cuts, _placing(COMMANDS, points), model)
+    return replace(made, jumps=picked_up(model))
 
 
 def driving_modes(plant: Plant) -> HybridModel:
@@ -143,7 +146,7 @@ def driving_modes(plant: Plant) -> HybridModel:
     ends = (made({POSITION: (end,)}) for end in stop_cut(travel))
     stopped = (guarded(each, travel, mode) for each in ends for mode in each.modes)
     free = made({POSITION: side_cut(model), VELOCITY: travel.friction_cut()}).modes
-    return HybridModel(plant, model, (neutral, *stopped, *free), AT_STOPS)
+    return HybridModel(plant, model, (neutral, *stopped, *free), AT_STOPS, picked_up(model))
 
 
 def _at_room_temperature(plant: Plant) -> Placing:
@@ -207,6 +210,14 @@ def neutral_guards(model: DesignModel) -> tuple[Guard, ...]:
     """Slow, and pushed to Neutral from both sides."""
     slow = (Guard({VELOCITY: sign}, NEUTRAL_M_S) for sign in (1.0, -1.0))
     return (*slow, *(_push(model, sign) for sign in (-1.0, 1.0)))
+
+
+def picked_up(model: DesignModel) -> tuple[Jump, ...]:
+    """The main piston picks up the floating one at Neutral on its way up, and slows down.
+
+    On the way down the floating one stays behind at its shoulder.
+    """
+    return (Jump(POSITION, 0.0, VELOCITY, carried_share(model)),)
 
 
 def valve_flows(plant: Plant) -> Callable[[float, float], np.ndarray]:

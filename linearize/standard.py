@@ -1,4 +1,7 @@
-"""The standard modes of each plant: where its signals are cut, and where the points lie."""
+"""The standard modes of each plant: where its signals are cut, and where the points lie.
+
+Source: physics.md 4.2 (gearbox) and 4.3 (all others).
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ from linearize.axes import DRIVE, drive_axis, joint_axes, rig_axis, travel_axis
 from linearize.cylinder_modes import place_modes
 from linearize.cylinder_modes import regime_modes as modes_by_regime
 from linearize.equilibrium import OperatingPoint
-from linearize.leg_modes import joint_modes, leg_modes
+from linearize.leg_modes import joint_modes, leg_modes, leg_regimes
 from linearize.modes import HybridModel, Interval, hybrid_modes
 from linearize.reduction import DesignModel, design_model
 from linearize.shift_modes import gearbox_modes
@@ -54,11 +57,15 @@ def _crr_rig(plant: Plant) -> HybridModel:
 
 
 def _crr_arm(plant: Plant) -> HybridModel:
-    return place_modes(plant, *joint_axes(plant), design_model(plant))
+    return place_modes(plant, travel_axis(plant), design_model(plant))
 
 
 def _crr_leg(plant: Plant) -> HybridModel:
     return leg_modes(plant, joint_axes(plant))
+
+
+def _crr_leg_regimes(plant: Plant) -> HybridModel:
+    return leg_regimes(plant, joint_axes(plant))
 
 
 def _soft_joint(plant: Plant) -> HybridModel:
@@ -114,6 +121,7 @@ STANDARD_MODES: dict[str, Callable[[Plant], HybridModel]] = {
 REGIME_MODES: dict[str, Callable[[Plant], HybridModel]] = {
     "servo_drive": _servo_drive_regimes,
     "crr_rig": _crr_rig,
+    "crr_leg": _crr_leg_regimes,
 }
 """Valve x flow regimes x friction x stops, for plants whose standard modes may be fewer."""
 

@@ -47,7 +47,8 @@ def guarded(hybrid: HybridModel, travel: Travel, mode: Mode) -> Mode:
     What comes against the stop faster than it rests is stopped whatever the force: that speed
     outweighs what the supply's pressure can do.
     """
-    model = hybrid.model
+    others = [n for s, region in mode.box.items() if s != travel.position for n in region.holds]
+    model = hybrid.model.holding(others)
     away = 1 if mode.box[travel.position].label == travel.prefix + LOWER else -1
     probes = away * np.linspace(travel.resting, travel.sliding, PROBES)
     column = model.states.index(travel.velocity)
@@ -58,10 +59,19 @@ def guarded(hybrid: HybridModel, travel: Travel, mode: Mode) -> Mode:
     strongest = max(abs(w) for name, w in pulled.items() if name.endswith("_pa")) * supply_pa
     pulled[travel.velocity] = -away * strongest / travel.resting
     guards = (Guard({travel.velocity: -away}, travel.resting), Guard(pulled, -float(row[-1])))
-    return replace(mode, guards=guards)
+    return replace(mode, guards=(*mode.guards, *guards))
+
+
+def stopped_signals(hybrid: HybridModel) -> set[str]:
+    """The positions that some mode holds at an end stop."""
+    return {
+        signal
+        for mode in hybrid.modes
+        for signal, region in mode.box.items()
+        if region.label.endswith((LOWER, UPPER))
+    }
 
 
 def has_stops(hybrid: HybridModel) -> bool:
     """True where some mode holds what rests against an end stop."""
-    labels = (region.label for mode in hybrid.modes for region in mode.box.values())
-    return any(label.endswith((LOWER, UPPER)) for label in labels)
+    return bool(stopped_signals(hybrid))

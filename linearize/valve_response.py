@@ -4,6 +4,8 @@ Coil and armature of a solenoid valve answer late, later to a release than to an
 bounce on their seats; a pulse of a few milliseconds opens a valve for another time than it lasts.
 None of that depends on the gas.  With a least time between two switches of a valve the histories
 of commands that matter are few, and each is run once when the controller is designed.
+
+Source: physics.md 2.5 (coil, armature, and what the ports pass).
 """
 
 from __future__ import annotations

@@ -135,11 +135,14 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 def studies_text() -> str:
-    """One line per study: its name, what it asks, and where the question comes from."""
+    """One line per study: its name, what it asks, its source, and the papers' rows in it."""
     from studies.registry import STUDIES
 
-    rows = [(study.name, study.question, study.source) for study in STUDIES.values()]
-    return columns(("study", "what it asks", "source"), rows)
+    rows = [
+        (study.name, study.question, study.source, ", ".join(study.rows) or "-")
+        for study in STUDIES.values()
+    ]
+    return columns(("study", "what it asks", "source", "rows"), rows)
 
 
 def _names(full: list[str] | tuple[str, ...]) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
+from workbench.diagnosis.result import told
 from workbench.units import public_name, si_unit
 
 if TYPE_CHECKING:
@@ -49,6 +50,7 @@ def _compared(each: RecordingComparison) -> Document:
             public_name(name): plain(residual.outside) for name, residual in each.residuals.items()
         },
         "judged_on": each.judged,
+        "window_s": plain(each.window_s),
         "by_regime": [
             {
                 "regime": regime.name,
@@ -103,6 +105,7 @@ def modes_document(
         "rig": rig_name,
         "left_out": [vars(item) for item in hybrid.model.left_out],
         "no_modes": [vars(item) for item in hybrid.no_modes],
+        "jumps": [vars(jump) for jump in hybrid.jumps],
         "modes": document(hybrid, regions),
     }
 
@@ -171,9 +174,9 @@ def _ranked(row: Ranked) -> Document:
             }
             for name, size in row.size.items()
         },
-        "error_drop_train": plain(row.drop_train),
-        "error_drop_validation": plain(row.drop_validation),
-        "error_drop_wide_priors": plain(row.drop_wide),
+        "error_drop_train": plain(told(row.drop_train)),
+        "error_drop_validation": plain(told(row.drop_validation)),
+        "error_drop_wide_priors": plain(told(row.drop_wide)),
         "modification_index": plain(row.modification_index),
         "tied_with": list(row.tied_with),
         "imitated_by": {name: plain(share) for name, share in row.imitated_by.items()},
@@ -232,8 +235,8 @@ def law_document(law: Law) -> Document:
             public_name(name): {"low": plain(low), "high": plain(high), "unit": si_unit(name)}
             for name, (low, high) in law.ranges.items()
         },
-        "error_drop_train": plain(law.drop_train),
-        "error_drop_validation": plain(law.drop_validation),
+        "error_drop_train": plain(told(law.drop_train)),
+        "error_drop_validation": plain(told(law.drop_validation)),
         "text": law.text,
         "kind": "empirical",
         "add": [step.candidate.name for step in law.steps],

@@ -11,8 +11,8 @@ from scipy.signal import lfilter
 
 from estimators import ESTIMATORS
 from estimators.augmentation import AugmentedPlant, Unknown, augmented
+from estimators.scheduled_kalman import noise_for
 from estimators.tuning import tuned_noise
-from studies.estimator_runs import with_start
 from studies.estimator_truths import TrueRun
 from workbench.effects.empirical import ConstantFlow
 from workbench.parts import Chamber
@@ -88,8 +88,8 @@ def made(
         plant=plant,
         sample_time_s=1.0 / 400 if plant.name == "soft_joint" else 1e-3,
         measurement_noise={n: SENSORS[n] for n in plant.measured},
-        process_noise=process_noise,
-        **with_start(ESTIMATORS[name], start),
+        process_noise=noise_for(ESTIMATORS[name], plant, process_noise),
+        initial_deviation=start,
     )
 
 

@@ -109,12 +109,6 @@ def _followed(last: Estimate, rows: Sequence[tuple], told: Sequence[Mapping]) ->
     return Followed(last.names, states.T, covariances, innovations.T, nis, received, took, notes)
 
 
-def with_start(kind: Any, deviation: Mapping[str, float]) -> dict[str, Mapping[str, float]]:
-    """The deviations of the start as a field, for kinds of estimators that have one."""
-    known = "initial_deviation" in kind.__dataclass_fields__
-    return {"initial_deviation": deviation} if known else {}
-
-
 def fed(plant: Plant, recording: Recording) -> tuple[Plant, np.ndarray, np.ndarray]:
     """The plant with its measured inputs commanded; commands (n_u, n) and outputs (n_y, n)."""
     u, d = inputs(plant, recording)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from studies.documents import Document, errors, law_document, plain
-from studies.text import columns, number, percent
+from studies.text import columns, number, removed
 from studies.text_of_results import before_after_text, law_text, moved_text
 from workbench.units import public_name, si_unit
 
@@ -51,8 +51,8 @@ def thoughts_text(found: Improvement) -> list[str]:
         rows = [
             (
                 each.candidate.name,
-                percent(each.share_train, 1),
-                percent(each.share_validation, 1),
+                removed(each.share_train),
+                removed(each.share_validation),
                 _stays(each),
             )
             for each in found.removals
@@ -74,7 +74,7 @@ def _stays(each: Removal) -> str:
 def _rivals(each: Swap) -> list[tuple[str, str, str, str]]:
     verdict = "takes its place" if each.replaced else "not clearly better"
     shares = ((each.share_train, each.share_validation), (each.rival_train, each.rival_validation))
-    (a, b), (c, d) = ((percent(x, 1), percent(y, 1)) for x, y in shares)
+    (a, b), (c, d) = ((removed(x), removed(y)) for x, y in shares)
     return [
         (each.candidate.name, a, b, ""),
         (f"  or {each.rival.name}", c, d, verdict),

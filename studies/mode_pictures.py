@@ -42,7 +42,7 @@ def step_of(hybrids: Mapping[str, HybridModel]) -> Step:
     first = next(iter(hybrids.values()))
     plant, view = first.plant.lean(), view_of(first)
     commands = Recording("step", view.sample_time_s, sent_commands(view, plant))
-    seen = visited(first.model, plant, simulate(plant, commands), at_stops=True)
+    seen = visited(first.model, plant, simulate(plant, commands, view.start), at_stops=True)
     runs = {
         label: sampled_hybrid(hybrid, view.sample_time_s).run(seen.states[:, 0], seen.commands)
         for label, hybrid in hybrids.items()
@@ -53,8 +53,8 @@ def step_of(hybrids: Mapping[str, HybridModel]) -> Step:
 def step_figure(step: Step) -> Figure:
     """The step; the modes that are named are those of the first model."""
     first = next(iter(step.hybrids.values()))
-    seen = step.seen
-    return overlay_figure(first, seen.sample_time_s, seen.states, seen.commands, step.runs)
+    seen, shown = step.seen, view_of(first).shown
+    return overlay_figure(first, seen.sample_time_s, seen.states[:shown], seen.commands, step.runs)
 
 
 def map_figure(modes: SampledHybrid) -> Figure:

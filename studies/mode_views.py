@@ -6,20 +6,24 @@ Openings, speeds and durations are *chosen* so that the plant passes several mod
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from linearize.axes import drive_axis, joint_axes, rig_axis
 from linearize.axis import Axis
+from linearize.leg_modes import leg_placing
 from linearize.modes import HybridModel
-from linearize.shifting import FLOWS, POSITION, VELOCITY
+from linearize.reduction import design_model
+from linearize.shifting import FLOWS, POSITION, PRESSURES, VELOCITY
+from linearize.stopped import stopped_signals
 from linearize.vessel_modes import Filling, bellows, reservoir
 from workbench.effects import DeadZone
 from workbench.plant import Plant
 from workbench.plants.gearbox import COMMANDS, STROKE_M
 from workbench.units import display_unit
 
+BEYOND = 0.04  # of a range, to either side
 Span = tuple[float, Mapping[str, float]]  # seconds, and what is sent for so long
 
 
@@ -30,17 +34,25 @@ class View:
     ranges     lower and upper end of the two signals, the one across first
     panels     values of other signals by title
     spans      commands as they are sent, one after the other
+    start      state of the plant, with all of its own, where it is not the initial one; (n_x,)
+    shown      so many states are drawn
     """
 
     ranges: Mapping[str, tuple[float, float]]
     panels: Mapping[str, Mapping[str, float]]
     spans: tuple[Span, ...]
     sample_time_s: float = 1e-3
+    start: np.ndarray | None = None
+    shown: int = 4
 
 
 def view_of(hybrid: HybridModel) -> View:
-    """The view of a plant."""
-    return VIEWS[hybrid.plant.name](hybrid.plant)
+    """The view of a plant; its map goes a little beyond the stops where they are modes."""
+    view, ranges = VIEWS[hybrid.plant.name](hybrid.plant), {}
+    for name, (low, high) in view.ranges.items():
+        more = BEYOND * (high - low) if name in stopped_signals(hybrid) else 0.0
+        ranges[name] = (low - more, high + more)
+    return replace(view, ranges=ranges)
 
 
 def _band(plant: Plant, command: str) -> float:
@@ -79,22 +91,32 @@ def _arm(plant: Plant) -> View:
 
 
 def _leg(plant: Plant) -> View:
-    """Angles of the joints in the leg's plane, the first one still; each joint slides in turn."""
-    axes = joint_axes(plant)
+    """Angles of the joints in the leg's plane, the first one still; each joint slides in turn.
+
+    All begins at rest, where the pressures carry the leg.
+    """
+    axes, model = joint_axes(plant), design_model(plant)
     _, second, third = axes
+    rest = leg_placing(axes)(model, {})
+    values = dict(zip((*model.states, *model.commands), (*rest.state, *rest.command), strict=True))
     speeds = {"joint 2 down": -0.5, "at rest": 0.0, "joint 2 up": 0.5}
-    rest = {axis.command: axis.centre for axis in axes}
-    moves = (rest | {axis.command: axis.centre + 0.3} for axis in axes)
+    still = {axis.command: values[axis.command] for axis in axes}
+    moves = (still | {name: value + 0.3} for name, value in still.items())
     return View(
         ranges={second.position: second.ends, third.position: third.ends},
-        panels={title: {second.velocity: speed} for title, speed in speeds.items()},
-        spans=((0.05, rest), *((0.15, sent) for sent in moves), (0.15, rest)),
+        panels={title: values | {second.velocity: speed} for title, speed in speeds.items()},
+        spans=((0.05, still), *((0.15, sent) for sent in moves), (0.15, still)),
+        start=model.full_under(rest.state, rest.command).full().ravel(),
+        shown=6,
     )
 
 
 def _gearbox(plant: Plant) -> View:
-    """Position and speed of the main piston; from Neutral to High and back."""
-    flow_kg_s = 1e-2
+    """Position and speed of the main piston; from Neutral to High and back.
+
+    A map's pressures are those after some milliseconds of charging and venting.
+    """
+    flow_kg_s, pressure_pa = 1e-2, {1: 7e5, -1: 2e5}
     pairs = {
         "1 charges, 2 vents": (1, -1),
         "both charge": (1, 1),
@@ -102,6 +124,7 @@ def _gearbox(plant: Plant) -> View:
     }
     panels = {
         title: dict(zip(FLOWS, (flow_kg_s * sign for sign in signs), strict=True))
+        | dict(zip(PRESSURES, (pressure_pa[sign] for sign in signs), strict=True))
         for title, signs in pairs.items()
     }
     sent = [dict(zip(COMMANDS, values, strict=True)) for values in ((0, 0), (1, 0), (1, 1))]
@@ -110,6 +133,7 @@ def _gearbox(plant: Plant) -> View:
         panels=panels,
         spans=((0.002, sent[0]), (0.01, sent[1]), (0.01, sent[2])),
         sample_time_s=1e-4,
+        shown=6,
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from linearize.listing import left_out, no_modes, table
+from linearize.listing import jumps, left_out, no_modes, table
 from studies.text import columns, number, shown
 from workbench.units import public_name
 
@@ -22,6 +22,8 @@ def modes_text(hybrid: HybridModel, regions: Sequence[Validity]) -> str:
     parts.append(f"left out of the modes:\n{left_out(hybrid) or 'nothing'}")
     if hybrid.no_modes:
         parts.append(f"no modes of their own:\n{no_modes(hybrid)}")
+    if hybrid.jumps:
+        parts.append(f"jumps between modes:\n{jumps(hybrid)}")
     return "\n\n".join(parts)
 
 

@@ -35,17 +35,25 @@ class Separation:
     after: Diagnosis | None
 
     @property
-    def broken(self) -> bool:
-        """The hidden effect leads, and of the rivals that asked for the recording none is left.
+    def asked(self) -> tuple[str, ...]:
+        """The rivals of the hidden effect that the recording was to tell it from."""
+        rivals = (self.before.ranking[0].candidate.name, *_alike(self.before))
+        return tuple(rival for rival in rivals if rival != self._name)
 
-        A new one may stand beside it: a longer stroke shows more of what always is there.
+    @property
+    def left(self) -> tuple[str, ...]:
+        """Those of them that stand beside the hidden effect still, all where it does not lead.
+
+        A new one may stand there too: a longer stroke shows more of what always is there.
         """
         leader = self.after.ranking[0] if self.after else None
-        name = SERVO_DRIVE.public_name(self.case)
-        if leader is None or not leader.accepted or leader.candidate.name != name:
-            return False
-        asked = {self.before.ranking[0].candidate.name, *_alike(self.before)} - {name}
-        return not asked & set(_alike(self.after))
+        if leader is None or not leader.accepted or leader.candidate.name != self._name:
+            return self.asked
+        return tuple(rival for rival in self.asked if rival in _alike(self.after))
+
+    @property
+    def _name(self) -> str:
+        return SERVO_DRIVE.public_name(self.case)
 
 
 def _alike(found: Diagnosis | None) -> tuple[str, ...]:
@@ -82,7 +90,9 @@ def separation_text(found: Separation) -> str:
         lines.append(f"  {asked.what}; gain {asked.expected_gain:.3g}, alike {asked.alike}")
     if found.after:
         lines.append(f"  after it {found.after.verdict.value}: {found.after.sentence}")
-    return "\n".join([*lines, f"  {'broken' if found.broken else 'NOT broken'}"])
+    told, of = len(found.asked) - len(found.left), len(found.asked)
+    still = f", not from {', '.join(found.left)}" if found.left else ""
+    return "\n".join([*lines, f"  told from {told} of {of} rivals{still}"])
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -234,6 +234,7 @@ def _text(
 STUDY = Study(
     name="soft-joint-mhe",
     question="does a moving horizon on one time constant make up for a spool that sticks?",
-    source="paper 004, S004-1 to S004-5",
+    source="paper 004, S004-3 to S004-5",
     run=run,
+    rows=("S004-3", "S004-4", "S004-5"),
 )

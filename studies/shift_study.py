@@ -213,4 +213,5 @@ STUDY = Study(
     question="what explains the gap between paper 003's state-space model and its nonlinear one?",
     source="paper 003 Fig. 4, S003-3",
     run=run,
+    rows=("S003-3",),
 )

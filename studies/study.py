@@ -55,9 +55,12 @@ class Study:
         Paper and experiment, or the design document that asks for it.
     run
         (folder for what must survive a kill, extent, progress) -> outcome.
+    rows
+        Experiments of the papers that it reproduces, as physics.md section 5 numbers them.
     """
 
     name: str
     question: str
     source: str
     run: Callable[[Path, Extent, Callable[[str], None]], Outcome]
+    rows: tuple[str, ...] = ()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from math import isfinite
 
+from workbench.diagnosis.result import told
 from workbench.units import display_scale, display_unit, public_name
 
 
@@ -39,6 +40,11 @@ def number(value: float, digits: int = 4) -> str:
 def percent(share: float, digits: int = 0) -> str:
     """A share as a percentage; a dash where there is none."""
     return f"{100.0 * share:.{digits}f} %" if isfinite(share) else "-"
+
+
+def removed(share: float) -> str:
+    """A share of a misfit that something removes: more than all of it is none."""
+    return percent(told(share), 1)
 
 
 def shown(value: float, name: str, digits: int = 4) -> str:

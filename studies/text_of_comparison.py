@@ -27,8 +27,9 @@ def _recording_text(each: RecordingComparison) -> str:
         f"{span.start_s:.2f} to {span.end_s:.2f} s ({percent(span.share_of_error, 1)})"
         for span in each.worst
     )
+    windows = f", windows of {each.window_s:.3g} s" if np.isfinite(each.window_s) else ""
     parts = [
-        f"{each.name}: {each.time_s[-1]:.4g} s",
+        f"{each.name}: {each.time_s[-1]:.4g} s{windows}",
         _errors(each),
         _regimes(each.by_regime),
         f"worst: {worst}" if worst else "",

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from math import isfinite
 from typing import TYPE_CHECKING
 
-from studies.text import columns, number, percent, shown
+from studies.text import columns, number, percent, removed, shown
 from workbench.units import public_name
 
 if TYPE_CHECKING:
@@ -73,8 +73,8 @@ def ranking_text(found: Diagnosis) -> str:
         (
             str(place),
             row.candidate.name,
-            percent(row.drop_train, 1),
-            percent(row.drop_validation, 1),
+            removed(row.drop_train),
+            removed(row.drop_validation),
             number(row.modification_index, 3),
             percent(row.compensable),
             sizes_text(row),
@@ -98,7 +98,7 @@ def law_text(law: Law) -> str:
     names = " ".join(f'"{step.candidate.name}"' for step in law.steps)
     return (
         f"law (empirical, not a physical effect): {names}; "
-        f"drop train {percent(law.drop_train, 1)}, validation {percent(law.drop_validation, 1)}; "
+        f"drop train {removed(law.drop_train)}, validation {removed(law.drop_validation)}; "
         f"seen for {', '.join(ranges)}\n"
         "`workbench add RIG law --fit ...` takes it, `improve --law` does where nothing else helps"
     )
@@ -132,14 +132,12 @@ def where_text(found: Diagnosis) -> str:
         "where: " + ", ".join(f"{public_name(k)} {number(v)}" for k, v in gains)
         + " (log-likelihood gained by an unknown input)"
     ]  # fmt: skip
-    lines.append(
-        f"missing term of {where.balance} follows "
-        + ", ".join(f"{public_name(d.variable)} {percent(d.explains)}" for d in where.against[:3])
-    )
+    follows = [f"{public_name(d.variable)} {percent(d.explains)}" for d in where.against[:3]]
+    if follows:
+        lines.append(f"missing term of {where.balance} follows {', '.join(follows)}")
     lines += [] if where.memory is None else [_memory_text(*where.memory)]
-    shares = list(where.by_regime.items())[:4]
-    lines.append("error in: " + ", ".join(f"{name} {percent(share)}" for name, share in shares))
-    return "\n".join(lines)
+    shares = [f"{name} {percent(share)}" for name, share in where.by_regime.items()][:4]
+    return "\n".join([*lines, *([f"error in: {', '.join(shares)}"] if shares else [])])
 
 
 def _memory_text(followed: Dependence, loop: Loop) -> str:
@@ -219,9 +217,9 @@ def unit_names(outputs: tuple[str, ...]) -> dict[str, str]:
 
 def addition_text(found: Addition, unit_of: Mapping[str, str]) -> str:
     """Errors before and after on both sets, and the parameters that moved."""
-    drops = f"misfit removed: {percent(found.drop_train, 1)} of training"
+    drops = f"misfit removed: {removed(found.drop_train)} of training"
     if isfinite(found.drop_validation):
-        drops += f", {percent(found.drop_validation, 1)} of {found.evidence.value}"
+        drops += f", {removed(found.drop_validation)} of {found.evidence.value}"
     parameters = moved_text(found.parameters)
     errors = before_after_text(found.before, found.after, unit_of)
     return "\n".join((errors, drops, "", parameters))

@@ -155,6 +155,7 @@ def test_pieces_of_a_split_recording_start_anew(drive, recording):
     found = compare(drive, [split]).recordings[0]
 
     assert found.errors[FREE_RUN][PRESSURE].rmse < 10 * NOISE[PRESSURE]
+    assert found.notes[0].startswith("2 pieces stand one behind the other, from 0, 0.3 s on")
 
 
 def test_a_recording_shorter_than_a_window_says_so(drive, recording):
@@ -162,6 +163,7 @@ def test_a_recording_shorter_than_a_window_says_so(drive, recording):
 
     assert WINDOW not in found.errors
     assert "window" in found.notes[0]
+    assert "windows of" not in comparison_text(Comparison(drive.name, (found,)))
 
 
 def test_a_plant_without_states_is_compared_sample_by_sample():
@@ -192,6 +194,8 @@ def test_the_document_holds_noise_regimes_shifts_and_whiteness(drive, bad):
         "value": 400.0, "unit": "Pa", "from": "given with the recording",
     }  # fmt: skip
     assert found["judged_on"] == WINDOW and found["shifts"] == []
+    assert found["window_s"] == 0.2
+    assert ", windows of 0.2 s" in comparison_text(Comparison(drive.name, (bad,)))
     assert {"regime", "share_of_error", "share_of_time"} == set(found["by_regime"][0])
     assert {"start_s", "end_s", "share_of_error"} == set(found["worst"][0])
     assert 0.0 <= found["lags_outside_band"]["slide.position"] <= 1.0

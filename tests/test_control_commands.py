@@ -6,9 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from commands import call
+from slide_controllers import SLIDE_CONTROLLERS
 
 from controllers.condensed import MpcSpec, limits_of
 from linearize.axes import stroke_m
+from linearize.standard import SLIDE_MODES
 from studies.checking import differences
 from studies.closed_loop_check import Check
 from studies.closed_loop_metrics import LOST_SHARE, Metrics, rise_s, table, valve_switches
@@ -61,6 +63,39 @@ def test_a_plant_without_standard_modes_is_refused_in_one_line(place, plant):
     assert answer.exit_code == 2
     assert f"{plant} has no standard modes" in answer.stderr
     assert len(answer.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize("method", SLIDE_CONTROLLERS)
+def test_no_design_is_written_for_a_mode_that_its_command_cannot_steer(
+    place, monkeypatch, tmp_path, method
+):
+    whole = SLIDE_MODES["servo_drive"]
+
+    def deaf(plant):
+        hybrid = whole(plant)
+        return replace(hybrid, modes=tuple(replace(m, B=0.0 * m.B) for m in hybrid.modes))
+
+    monkeypatch.setitem(SLIDE_MODES, "servo_drive", deaf)
+    written = tmp_path / "design.toml"
+    answer = call("design", place / "servo_drive.toml", "--controller", method, "-o", written, "-q")
+    (line,) = answer.stderr.splitlines()
+
+    assert answer.exit_code == 2
+    assert "mode 'charge a slide + near a': not controllable: its commands reach 0 of 4" in line
+    assert "expected a mode in which valve.command_v can steer slide.position_m" in line
+    assert not written.exists()
+
+
+def test_a_plant_that_nothing_can_drive_is_refused_in_one_line(place, tmp_path):
+    """A supply at ambient pressure: no valve makes the slide move steadily."""
+    weak = tmp_path / "weak.toml"
+    weak.write_text('plant = "servo_drive"\n[values]\n"supply.pressure" = "1.013 bar"\n')
+    answer = call("design", weak, "--controller", "lq", "-o", tmp_path / "lq.toml", "-q")
+    (line,) = answer.stderr.splitlines()
+
+    assert answer.exit_code == 2
+    assert "servo_drive: no operating point at slide.position_m 0.04833, slide.velo" in line
+    assert "slide.velocity_m_s, chamber_a.pressure_pa and chamber_b.pressure_pa stand still" in line
 
 
 def test_a_design_for_another_plant_is_refused(place, monkeypatch):

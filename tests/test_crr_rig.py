@@ -8,8 +8,8 @@ import oracle_crr_rig as oracle
 import pytest
 from conftest import PLANT_MODELS, standing_at
 from flat_cylinder import assert_same_as_flat
-from network_loop import tracked
 
+from studies.papers.loops import tracked
 from workbench.effects.proportional_valve import TwoFlows, segment_area_m2
 from workbench.recording import Recording
 from workbench.simulation import simulate

@@ -11,16 +11,25 @@ import numpy as np
 import pytest
 
 from linearize.modes import hybrid_modes, placed_at
-from linearize.shift_modes import DIRECTIONS, ShiftPoints, gearbox_modes, side_cut, switched_modes
+from linearize.shift_modes import (
+    DIRECTIONS,
+    ShiftPoints,
+    driving_modes,
+    gearbox_modes,
+    side_cut,
+    switched_modes,
+)
 from linearize.shifting import DETENT, FLOWS, HEAT, shift_model
 from linearize.standard import (
     REGIME_MODES,
     STANDARD_MODES,
+    axis_modes,
     servo_drive_cuts,
     standard_modes,
 )
 from workbench.leg import Leg
 from workbench.plants import PLANTS
+from workbench.plants.crr_leg import crr_leg
 from workbench.plants.gearbox import gearbox
 from workbench.plants.servo_drive import servo_drive
 
@@ -150,6 +159,33 @@ def test_modes_of_the_servo_drive_by_flow_regimes():
     hybrid = REGIME_MODES["servo_drive"](servo_drive())
 
     assert len(hybrid.modes) == 45
+    for mode in hybrid.modes:
+        assert_exact(hybrid, mode)
+
+
+@pytest.mark.parametrize("every", [37, pytest.param(1, marks=pytest.mark.slow)])
+def test_modes_of_the_leg_with_its_valves_and_stops(every):
+    hybrid = REGIME_MODES["crr_leg"](crr_leg())
+
+    assert len(hybrid.modes) == (2 * (2 + 3) + 2) ** 3
+    for mode in hybrid.modes[::every]:
+        assert_exact(hybrid, mode)
+
+
+def test_modes_of_the_gearbox_for_driving():
+    """With gas masses, dry friction, stops and Neutral."""
+    hybrid = driving_modes(gearbox())
+
+    assert len(hybrid.modes) == 3 + 2 * 3
+    for mode in hybrid.modes:
+        assert_exact(hybrid, mode)
+
+
+@pytest.mark.parametrize("plant", ["crr_rig", "crr_arm"])
+def test_modes_that_controllers_are_designed_on(plant):
+    hybrid = axis_modes(PLANTS[plant]())
+
+    assert hybrid.modes
     for mode in hybrid.modes:
         assert_exact(hybrid, mode)
 

@@ -2,14 +2,12 @@
 
 import numpy as np
 import pytest
-from linear_plant import MASS_KG, cart
+from linear_plant import cart
 from scipy.linalg import expm, solve_discrete_are
-from test_estimators import DT_S, NOISE_M, cart_data, on_cart, run
+from test_estimators import DT_S, cart_data, on_cart, run
 
 from estimators import ESTIMATORS
 from estimators.ahead import Ahead, in_time
-from estimators.augmentation import Unknown, augmented
-from estimators.foreseen import Foresight
 from estimators.gated import Gated
 from estimators.late import Late
 from estimators.scheduled_kalman import noise_of_modes, standard_bank
@@ -105,7 +103,8 @@ def test_the_scheduled_filter_follows_the_drive_through_its_modes():
         speed.append(x[1])
         x, sent = step(x, u, d, p).full().ravel(), u
 
-    assert curved[VELOCITY] == 2.0 and curved["friction.deflection_m"] == 1e-6
+    assert (curved[VELOCITY], curved[OUTPUTS[1]]) == (2.0, 1e5)
+    assert curved["friction.deflection_m"] == 1e-6
     assert len(modes) >= 4
     assert np.std(errors) < 0.1 * np.std(speed)
 
@@ -145,6 +144,20 @@ def test_an_outlier_is_left_out_and_all_else_is_not(name):
     assert gated[-1].state == pytest.approx(without[-1].state, rel=1e-9)
 
 
+def test_of_several_outputs_the_wrong_one_is_left_out():
+    u = np.tile(servo_drive().nominal[0], (30, 1))
+    y = [0.145, 5.65e5, 5.65e5] + [*SENSORS.values()] * np.random.default_rng(2).normal(
+        size=(30, 3)
+    )
+    wrong = y.copy()
+    wrong[20, 1] += 5e4
+    y[20, 1] = np.nan
+    gated, without = run(Gated(inner=on_drive("ekf")), u, wrong), run(on_drive("ekf"), u, y)
+
+    assert [e.notes["outliers"] for e in gated[1:]] == [float(k == 20) for k in range(1, 30)]
+    assert np.array_equal(gated[-1].state, without[-1].state)
+
+
 def test_a_sensor_that_jumped_for_good_is_believed_after_a_while():
     u, y = cart_data(80)
     y[30:] += 2.0
@@ -172,72 +185,6 @@ def test_sensors_of_several_rates_need_no_more_than_holes(name):
 
     assert x[1] > 0.1
     assert np.abs(velocity[60:]).max() < 0.05
-
-
-@pytest.mark.parametrize("name", ESTIMATORS)
-def test_an_unknown_force_is_found_by_every_estimator(name):
-    unknown = Unknown("cart.velocity_m_s", deviation=2.0, per_root_second=0.05)
-    plant = augmented(cart(), [unknown])
-    estimator = ESTIMATORS[name](
-        plant=plant,
-        sample_time_s=DT_S,
-        measurement_noise={"cart.position_m": NOISE_M},
-        process_noise={"cart.velocity_m_s": 1e-3, **plant.process_noise},
-    )
-    step, rng, x = cart().model.step(DT_S), np.random.default_rng(1), np.zeros(2)
-    _, d, p = cart().nominal
-    y = []
-    for _ in range(300):
-        y.append([x[0] + NOISE_M * rng.standard_normal()])
-        x = step(x, [1.6 * MASS_KG], d, p).full().ravel()
-    found = run(estimator, np.zeros((300, 1)), np.array(y))[-1]
-    (at,) = found.pick([unknown.state])
-    deviation = np.sqrt(found.covariance[2, 2])
-
-    assert at == pytest.approx(1.6, abs=3.0 * deviation)
-    assert deviation < 0.3
-
-
-def test_coloured_noise_keeps_its_size():
-    unknown = Unknown("cart.velocity_m_s", deviation=2.0, time_constant_s=0.05)
-    plant = augmented(cart(), [unknown])
-    estimator = ESTIMATORS["ekf"](
-        plant=plant,
-        sample_time_s=5e-4,
-        measurement_noise={"cart.position_m": NOISE_M},
-        process_noise=plant.process_noise,
-    )
-    estimate = estimator.start(np.zeros(1))
-    for _ in range(400):
-        estimate = Foresight(estimator).blind(estimate, np.zeros(1))
-
-    assert np.sqrt(estimate.covariance[2, 2]) == pytest.approx(2.0, rel=1e-3)
-
-
-def test_an_unknown_parameter_is_found():
-    plant = servo_drive().lean()
-    name = "friction.viscous_n_s_m"
-    unknown = augmented(plant, [Unknown(name, deviation=20.0, per_root_second=1.0)])
-    noise = SLIDING_NOISE | unknown.process_noise
-    estimator = on_drive("ekf", unknown, process_noise=noise)
-    truth = plant.with_values({name: plant.values[name] + 15.0})
-    step, (_, d, p) = truth.model.compiled_step(1e-3), truth.nominal
-    rng, x, estimate, sent = np.random.default_rng(5), plant.initial, None, plant.nominal[0]
-    for k in range(1500):
-        y = x[[0, 2, 4]] + rng.standard_normal(3) * list(SENSORS.values())
-        u = np.array([4.95 + 0.9 * np.sin(8.0 * k * 1e-3)])
-        estimate = estimate or estimator.start(y)
-        estimate = estimator.update(estimate, sent, y)
-        x, sent = step(x, u, d, p).full().ravel(), u
-
-    assert estimate.pick([f"unknown {name}"])[0] == pytest.approx(15.0, abs=4.0)
-
-
-def test_what_is_unknown_must_be_a_state_or_a_parameter():
-    with pytest.raises(Exception, match=r"cart has no cart\.velocity_m; did you mean"):
-        augmented(cart(), [Unknown("cart.velocity_m", deviation=1.0)])
-    with pytest.raises(ValueError, match="deviation and time constant above zero"):
-        Unknown("cart.velocity_m_s", deviation=0.0)
 
 
 WITH_STATES = [name for name, build in PLANTS.items() if build().state_list]

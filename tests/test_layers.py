@@ -28,7 +28,7 @@ TOOL_FILES = {
     "compiler.lock",
     "requirements.lock",
 }
-SLOW_TO_IMPORT = {"control", "cvxpy", "filterpy", "matplotlib.pyplot"}
+SLOW_TO_IMPORT = {"bokeh", "control", "cvxpy", "filterpy", "matplotlib.pyplot"}
 
 
 def imported(path: Path):

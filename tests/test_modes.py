@@ -143,7 +143,7 @@ def test_a_reduced_state_expands_to_gas_at_supply_temperature(plant):
 
 
 def test_a_point_without_solution_is_an_error(plant):
-    with pytest.raises(ValueError, match="no operating point of servo_drive"):
+    with pytest.raises(ValueError, match="servo_drive: no operating point at "):
         operating_point(design_model(plant), {VELOCITY: 9.0}, (COMMAND,), (VELOCITY,))
 
 

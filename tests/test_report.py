@@ -28,6 +28,7 @@ from workbench.diagnosis.result import (
     Verdict,
     Where,
 )
+from workbench.diagnosis.verdict import sentence
 from workbench.effect import Kind
 from workbench.effects.empirical import FORCES
 from workbench.fitting.errors import SignalError
@@ -113,6 +114,18 @@ def test_a_diagnosis_has_the_keys_of_the_contract():
     error = document["before"]["train"]["chamber_a.pressure"]
     assert (error["rmse"], error["unit"], error["fit_percent"]) == (8123.0, "Pa", 71.0)
     assert document["after"]["validation"] == {}
+
+
+def test_an_error_below_the_noise_is_no_more_than_the_whole_misfit_gone():
+    found = diagnosis()
+    rows = (replace(found.ranking[0], drop_train=1.05, drop_validation=1.002), *found.ranking[1:])
+    document = diagnosis_document(replace(found, ranking=rows), UNITS)
+
+    assert document["ranking"][0]["error_drop_train"] == 1.0
+    assert document["ranking"][0]["error_drop_validation"] == 1.0
+    text = diagnosis_text(replace(found, ranking=rows), UNITS)
+    assert re.search(r"chamber_leak@chamber_a +100\.0 % +100\.0 %", text)
+    assert "removes 100% of the misfit" in sentence(Verdict.FOUND, rows, None)
 
 
 def test_what_is_no_number_is_null_in_json():

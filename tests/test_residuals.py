@@ -109,6 +109,7 @@ SIGNALS = {
         0.05 * np.sin(2 * np.pi * 60.0 * DT * np.arange(4000)) + 1e-5 * white(4000),
         NoiseSource.UNCLEAR,
     ),
+    "fewer samples than tell": (1e-5 * white(42), NoiseSource.SHORT),
     "nothing but one value": (np.full(400, 0.1), NoiseSource.ASSUMED),
 }
 

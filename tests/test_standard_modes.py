@@ -6,10 +6,11 @@ import pytest
 from linearize.analysis import analyse
 from linearize.axes import joint_axes, rig_axis
 from linearize.hybrid_simulation import sampled_hybrid
+from linearize.leg_modes import leg_placing
 from linearize.reduction import closed_command, design_model
 from linearize.regimes import flow_regimes
 from linearize.rest import rest_of
-from linearize.standard import REGIME_MODES, STANDARD_MODES, standard_modes
+from linearize.standard import REGIME_MODES, STANDARD_MODES, axis_modes, standard_modes
 from linearize.stopped import has_stops
 from workbench.plants import PLANTS
 from workbench.plants.crr_rig import crr_rig
@@ -162,6 +163,41 @@ def test_each_joint_breaks_away_by_itself():
 
     assert moved[0] == 0.0
     assert moved[1] > 1e-4
+
+
+@pytest.mark.slow
+def test_a_leg_with_its_valves_cut_comes_to_its_stop_and_leaves_it():
+    """physics.md 2.3: joint 2 ends at 55 deg.  The valve opens by 0.8 V to one side, then back."""
+    plant = PLANTS["crr_leg"]()
+    model = design_model(plant)
+    rest = leg_placing(joint_axes(plant))(model, {})
+    modes, joint = sampled_hybrid(REGIME_MODES["crr_leg"](plant), 2e-3), "joint_2.angle_rad"
+    sent = np.tile(rest.command[:, None], (1, 350))
+    sent[1, :200] += 0.8
+    sent[1, 200:] -= 0.8
+    run = modes.run(rest.state, sent)
+    angle_deg = np.degrees(run.states[model.states.index(joint)])
+    active = [modes.hybrid.modes[k].name for k in run.modes]
+
+    assert rest.unrest < 1e-9
+    assert angle_deg[[0, 199]] == pytest.approx([20.0, 55.0], abs=0.1)
+    assert "2 at upper stop" in active[199]
+    assert angle_deg[-1] < 45.0
+    assert "2 at" not in active[-1]
+    assert np.ptp(run.states[model.states.index("joint_1.angle_rad")]) == 0.0
+
+
+def test_a_steady_slide_both_ways_by_place_has_no_drift_but_its_speed():
+    """What controllers of the arm are designed on."""
+    hybrid = axis_modes(PLANTS["crr_arm"]())
+
+    assert [mode.name for mode in hybrid.modes[:2]] == ["slide - low", "slide - mid"]
+    for mode in hybrid.modes:
+        rates = dict(zip(mode.state_names, mode.drift / mode.scale, strict=True))
+        assert abs(rates.pop("joint.angle_rad", 1.0)) > 0.1
+        assert np.abs([*rates.values()]).max() < 1e-8
+    with pytest.raises(KeyError, match="no modes to control one axis with for crr_leg; there are"):
+        axis_modes(PLANTS["crr_leg"]())
 
 
 def test_a_choked_fill_is_an_integrator_and_a_choked_vent_a_lag():

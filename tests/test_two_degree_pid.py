@@ -5,8 +5,6 @@ from math import pi, radians
 
 import numpy as np
 import pytest
-from cylinder_modes import PLANTS, cylinder_modes
-from network_loop import tracked
 
 from controllers.derivative import LowPassDerivative, SpanDerivative, settled
 from controllers.margins import both_ways_s, margins_of
@@ -23,11 +21,14 @@ from controllers.pid_tuning import (
 from controllers.scheduled import Schedule, driven_modes
 from controllers.two_degree_pid import Dither, PidGains, law_of
 from estimators.raw import RawMeasurement
-from linearize.standard import standard_modes
+from linearize.standard import axis_modes, standard_modes
+from studies.papers.loops import tracked
 from workbench.closed_loop import Hardware, close_loop
 from workbench.contracts import Estimate
 from workbench.errors import InputError
 from workbench.filtering import consistent_start
+from workbench.plants.crr_arm import crr_arm
+from workbench.plants.crr_rig import crr_rig
 from workbench.plants.servo_drive import servo_drive
 
 DT = 1e-3
@@ -36,7 +37,7 @@ BOTH = [LowPassDerivative(3e-3), SpanDerivative(5)]
 
 @pytest.fixture(scope="module")
 def rig():
-    return cylinder_modes(PLANTS["crr_rig"]())
+    return axis_modes(crr_rig())
 
 
 @pytest.fixture(scope="module")
@@ -197,7 +198,7 @@ def test_the_gains_of_the_papers_need_dry_friction_on_the_joint():
     parts = PidParts()
     stable = {}
     for name, gains in PAPER_GAINS.items():
-        hybrid = cylinder_modes(PLANTS[name]())
+        hybrid = axis_modes({"crr_rig": crr_rig, "crr_arm": crr_arm}[name]())
         modes = [side[1] for side in driven_modes(hybrid)]
         delay_s = both_ways_s(hybrid.plant)
         stable[name] = [pid_margins(mode, gains, parts, delay_s).stable for mode in modes]
@@ -219,7 +220,7 @@ def follow(plant, pid, reference):
 
 
 def test_the_papers_gains_give_the_loop_that_the_papers_are_reproduced_with(rig):
-    plant = PLANTS["crr_rig"]().lean()
+    plant = crr_rig().lean()
     reference = 0.0762 + 0.01 * np.sin(2.0 * pi * DT * np.arange(300))
     ours = follow(plant, pid_with(rig, PAPER_GAINS["crr_rig"]), reference)
     other = tracked(plant, reference, (250.0, 200.0, 8.0))[plant.measured[0]]
@@ -229,7 +230,7 @@ def test_the_papers_gains_give_the_loop_that_the_papers_are_reproduced_with(rig)
 
 def test_a_tuned_pid_with_feedforward_holds_a_sine_on_the_rig_that_the_papers_pid_does_not(rig):
     """1 Hz, 30 mm: measured 0.9 mm RMSE against 4.0 mm; the whole plant, 1 ms each way."""
-    plant = PLANTS["crr_rig"]().lean()
+    plant = crr_rig().lean()
     reference = 0.0762 + 0.03 * np.sin(2.0 * pi * DT * np.arange(1200))
     parts = PidParts(feedforward_share=1.0, setpoint_rate=1.0)
     pids = (
@@ -258,8 +259,8 @@ def test_a_tuned_pid_with_feedforward_brings_the_drive_near_its_place_without_a_
 
 def test_the_arm_stays_in_its_range_under_a_pid_for_its_weak_spring():
     """The joint allows 0.7 Hz where the rig allows 6: its spring is three times softer."""
-    plant = PLANTS["crr_arm"]()
-    hybrid = cylinder_modes(plant)
+    plant = crr_arm()
+    hybrid = axis_modes(plant)
     parts = replace(PidParts(), feedforward_share=1.0, turn_speed=0.1)
     pid = tuned_pid(hybrid, TuningSpec(bandwidth_hz=0.7), parts)
     reference = np.full(2500, radians(60.0))

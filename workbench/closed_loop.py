@@ -14,6 +14,7 @@ from time import perf_counter
 import numpy as np
 
 from workbench.arrivals import Arrivals
+from workbench.called import prepared
 from workbench.contracts import Controller, Estimator
 from workbench.plant import Plant, Signal
 from workbench.recording import Recording
@@ -124,7 +125,7 @@ def close_loop(
     ahead = np.pad(wanted, ((0, 0), (0, controller.preview * every)), mode="edge")
     normal = np.random.default_rng(seed).standard_normal((n, len(plant.measured)))
     plant_step = _Plant(plant, sample_time_s, n)
-    x = plant.initial if initial is None else np.asarray(initial, dtype=float)
+    x = np.array(plant.initial if initial is None else initial, dtype=float)
     command, estimate, ticks, rows = controller.start(), None, [], []
     for k in range(n):
         y = plant_step.outputs(x)
@@ -168,14 +169,14 @@ class _Plant:
         model, (u, d, p) = plant.model, plant.nominal
         self.down = Arrivals(plant.members, model.commands, n, sample_time_s, before=u)
         self.received = Arrivals(plant.members, model.measured, n, sample_time_s)
-        self.step, self.f = model.compiled_step(sample_time_s), model.f
-        self.u, self.d, self.p = u, d, p
+        self.step, self.f = prepared(model.compiled_step(sample_time_s)), prepared(model.f)
+        self.u, self.d, self.p = (np.array(each, dtype=float) for each in (u, d, p))
 
     def outputs(self, x: np.ndarray) -> np.ndarray:
-        return self.f(x, self.u, self.d, self.p)[1].full().ravel()
+        return self.f(x, self.u, self.d, self.p)[1]
 
     def __call__(self, x: np.ndarray, command: np.ndarray, k: int) -> np.ndarray:
-        x = self.step(x, self.down(command, k), self.d, self.p).full().ravel()
+        (x,) = self.step(x, self.down(command, k), self.d, self.p)
         if not np.isfinite(x).all():
             at_s = (k + 1) * self.sample_time_s
             raise ArithmeticError(f"{self.name}: the closed loop is not finite at {at_s:.4g} s")

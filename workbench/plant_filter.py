@@ -123,7 +123,7 @@ class PlantFilter:
     @cached_property
     def _predict(self) -> ca.Function:
         """(X, P, u, d, p, Q) -> (X, P, F) with what X gains in a step."""
-        plant, model, h = self.plant, self.plant.model, self.sample_time_s * self.decimate
+        plant, model = self.plant, self.plant.model
         n, n_w = len(model.states), len(self.unknown_inputs)
         X, P = ca.MX.sym("X", n + n_w), ca.MX.sym("P", n + n_w, n + n_w)
         u = ca.MX.sym("u", len(model.commands), self.decimate)
@@ -131,12 +131,7 @@ class PlantFilter:
         p = ca.MX.sym("p", len(model.parameters))
         S = self.scale
         x, w = S[:n] * X[:n], S[n:] * X[n:, 0]
-        now = p + ca.DM(self._wandering) @ w
-        A = model.jacobians(x, u[:, 0], d[:, 0], now)[0]
-        E = self._entering_at(x, u[:, 0], d[:, 0], now)
-        A = A * np.outer(1 / plant.scale, plant.scale)
-        coupling = E * np.outer(1 / plant.scale, S[n:])
-        F = transition(ca.blockcat([[A, coupling], [ca.MX(n_w, n), ca.MX(n_w, n_w)]]), h)
+        F = self.transition(X, u[:, 0], d[:, 0], p)
         Q = ca.MX.sym("Q", n + n_w, n + n_w)
         step = self.step
         for k in range(self.decimate):
@@ -144,6 +139,16 @@ class PlantFilter:
         later = ca.vertcat(x / plant.scale, X[n:, 0])
         P_later = F @ (P + Q / 2) @ F.T + Q / 2
         return ca.Function("predict", [X, P, u, d, p, Q], [later, P_later, F])
+
+    def transition(self, X: ca.MX, u: ca.MX, d: ca.MX, p: ca.MX) -> ca.MX:
+        """F of a step of the filter from X on, see the module."""
+        model, n, n_w = self.plant.model, len(self.plant.scale), len(self.unknown_inputs)
+        S = self.scale
+        x, now = S[:n] * X[:n], p + ca.DM(self._wandering) @ (S[n:] * X[n:, 0])
+        A = model.jacobians(x, u, d, now)[0] * np.outer(1 / S[:n], S[:n])
+        coupling = self._entering_at(x, u, d, now) * np.outer(1 / S[:n], S[n:])
+        A = ca.blockcat([[A, coupling], [ca.MX(n_w, n), ca.MX(n_w, n_w)]])
+        return transition(A, self.sample_time_s * self.decimate)
 
     @cached_property
     def correct(self) -> ca.Function:

@@ -3,12 +3,15 @@
 Whatever takes time to import is imported inside the commands, so that ``--help`` is quick.
 """
 
+from typing import Any
+
 from studies.command_line import (
     catalogue,
     control,
     estimation,
     identify,
     missing,
+    page,
     plant,
     show,
     study,
@@ -33,8 +36,16 @@ ORDER = [
     "estimate",
     "study",
     "report",
+    "app",
 ]
-app.registered_commands.sort(key=lambda command: ORDER.index(command.callback.__name__))
+
+
+def _place(command: Any) -> int:
+    """Where a command stands in the list of ``--help``."""
+    return ORDER.index(command.name or command.callback.__name__)
+
+
+app.registered_commands.sort(key=_place)
 
 __all__ = [
     "app",
@@ -44,6 +55,7 @@ __all__ = [
     "identify",
     "main",
     "missing",
+    "page",
     "plant",
     "show",
     "study",

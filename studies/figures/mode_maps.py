@@ -23,7 +23,8 @@ PALE = 0.55  # of white in the colours, so that numbers can be read on them
 TURN = 0.618  # of the colours between one mode and the next: neighbours differ
 SHOWN = 0.004  # of the cells: smaller regions have no number
 FINE = 0.02  # of the range: a narrower holding interval asks for a logarithmic axis around zero
-TEXT_WIDTH = 105  # letters that a line of the legend takes
+TEXT_WIDTH = 160  # letters that a line of the legend takes
+MAP_IN, LINE_IN = 2.7, 0.14  # height of the maps, and of a line of the legend
 
 Range = tuple[float, float]
 
@@ -41,23 +42,24 @@ def mode_map_figure(
     from matplotlib.lines import Line2D
 
     edges = {name: _edges(modes, name, ends) for name, ends in ranges.items()}
-    shown: set[int] = set()
+    drawn = {title: _active(modes, edges, values) for title, values in panels.items()}
+    shown = sorted({k for active in drawn.values() for k in _large(active)})
+    lines = [f"{k + 1}  {modes.hybrid.modes[k].name}" for k in shown]
+    columns = max(TEXT_WIDTH // (max(map(len, lines)) + 5), 1)
     with styled():
-        figure = new_figure(PAGE_IN, 4.2)
+        figure = new_figure(PAGE_IN, MAP_IN + LINE_IN * -(-len(lines) // columns))
         axes = figure.subplots(1, len(panels), sharex=True, sharey=True, squeeze=False)[0]
-        for panel, (title, values) in zip(axes, panels.items(), strict=True):
-            active = _active(modes, edges, values)
+        for panel, (title, active) in zip(axes, drawn.items(), strict=True):
             _drawn(panel, edges, active, len(modes.hybrid.modes))
-            shown |= _numbered(panel, edges, active)
+            _numbered(panel, edges, active)
             panel.set_title(title)
             panel.set_xlabel(labelled(next(iter(ranges))))
         axes[0].set_ylabel(labelled([*ranges][1]))
-        lines = [f"{k + 1}  {modes.hybrid.modes[k].name}" for k in sorted(shown)]
         figure.legend(
             [Line2D([], [], linestyle="none") for _ in lines],
             lines,
             loc="outside lower center",
-            ncols=max(TEXT_WIDTH // (max(map(len, lines)) + 5), 1),
+            ncols=columns,
             handlelength=0.0,
             handletextpad=0.0,
         )
@@ -87,10 +89,14 @@ def _edges(modes: SampledHybrid, name: str, ends: Range) -> np.ndarray:
 
 
 def _near(modes: SampledHybrid, name: str) -> float:
-    """Half of the narrowest interval in which a signal is held, infinite where it is not."""
-    regions = [mode.box[name] for mode in modes.hybrid.modes if name in mode.box]
-    widths = (region.upper - region.lower for region in regions if region.holds)
-    return min(widths, default=np.inf) / 2.0
+    """Half of the narrowest interval in which a signal is held or slow, infinite without one."""
+    every = modes.hybrid.modes
+    regions = [mode.box[name] for mode in every if name in mode.box]
+    halves = [(region.upper - region.lower) / 2.0 for region in regions if region.holds]
+    guards = [guard for mode in every for guard in mode.guards if [*guard.weights] == [name]]
+    return min(
+        [*halves, *(abs(each.offset / each.weights[name]) for each in guards)], default=np.inf
+    )
 
 
 def _drawn(
@@ -111,18 +117,19 @@ def _drawn(
             set_scale("symlog", linthresh=10.0 * float(steps.min()))
 
 
-def _numbered(panel: Axes, edges: Mapping[str, np.ndarray], active: np.ndarray) -> set[int]:
-    """Numbers in the regions that are large enough, and which those are."""
+def _large(active: np.ndarray) -> list[int]:
+    """The modes whose regions are large enough for a number."""
+    found, cells = np.unique(active, return_counts=True)
+    return [int(k) for k in found[cells > SHOWN * active.size]]
+
+
+def _numbered(panel: Axes, edges: Mapping[str, np.ndarray], active: np.ndarray) -> None:
     x, y = (_middles(display_scale(name).from_si(each)) for name, each in edges.items())
-    shown = set()
-    for k in np.unique(active):
+    for k in _large(active):
         rows, columns = np.nonzero(active == k)
-        if len(rows) > SHOWN * active.size:
-            away = (rows - rows.mean()) ** 2 + (columns - columns.mean()) ** 2
-            place = (x[columns[away.argmin()]], y[rows[away.argmin()]])
-            panel.annotate(str(k + 1), place, ha="center", va="center", fontsize=7)
-            shown.add(int(k))
-    return shown
+        away = (rows - rows.mean()) ** 2 + (columns - columns.mean()) ** 2
+        place = (x[columns[away.argmin()]], y[rows[away.argmin()]])
+        panel.annotate(str(k + 1), place, ha="center", va="center", fontsize=7)
 
 
 def _middles(edges: np.ndarray) -> np.ndarray:

@@ -1,7 +1,8 @@
-"""The poles of all modes in one plane."""
+"""The poles of modes: all in one plane, by what distinguishes them, and a small map for each."""
 
 from __future__ import annotations
 
+from textwrap import wrap
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,14 +14,18 @@ if TYPE_CHECKING:
 
     from linearize.modes import HybridModel, Mode
 
+SINGLE_MAPS = 64  # more modes have no map each
+ACROSS, LETTERS = 6, 26  # maps side by side, and letters of a line above one
 MARKERS = ("o", "s", "^", "D", "v", "x")
 COLOURS = (BLUE, RED, GREEN, ORANGE)
 
 
 def pole_figure(hybrid: HybridModel) -> Figure:
-    """Poles of every mode: a panel per interval of the first cut, markers for the second."""
-    first, *rest = max((mode.box for mode in hybrid.modes), key=len)
-    second = rest[0] if rest else first
+    """Poles of every mode: a panel per region of one cut, a marker per region of another.
+
+    Markers tell where something holds, by sticking or at a stop, panels the first other cut.
+    """
+    first, second = _cuts(hybrid)
     panels = list(dict.fromkeys(_label(mode, first) for mode in hybrid.modes))
     kinds = list(dict.fromkeys(_label(mode, second) for mode in hybrid.modes))
     with styled():
@@ -58,6 +63,51 @@ def pole_figure(hybrid: HybridModel) -> Figure:
     return figure
 
 
+def mode_poles_figure(hybrid: HybridModel) -> Figure:
+    """A pole map for every mode, all to one scale."""
+    number = len(hybrid.modes)
+    across = min(ACROSS, number)
+    down = -(-number // across)
+    with styled():
+        figure = new_figure(PAGE_IN, 0.8 + 1.05 * down)
+        grid = figure.subplots(down, across, sharex=True, sharey=True, squeeze=False)
+        for panel in grid.ravel()[number:]:
+            panel.remove()
+        for k, (panel, mode) in enumerate(zip(grid.ravel(), hybrid.modes, strict=False)):
+            poles = np.linalg.eigvals(mode.A)
+            panel.axvline(0.0, color="0.4", linewidth=0.6)
+            panel.plot(
+                poles.real,
+                poles.imag,
+                "x",
+                color=BLUE,
+                markersize=4,
+                linestyle="none",
+                label="pole",
+            )
+            panel.margins(0.15)
+            panel.set_title("\n".join(wrap(f"{k + 1}  {mode.name}", LETTERS)), fontsize=5.5)
+            panel.tick_params(labelsize=6, labelbottom=k + across >= number)
+        figure.supxlabel("real part (1/s)", fontsize=8)
+        figure.supylabel("imaginary part (rad/s)", fontsize=8)
+    return figure
+
+
+def _cuts(hybrid: HybridModel) -> tuple[str, str]:
+    """The signals of the panels and of the markers: of these a velocity that rests, if one does."""
+    from linearize.holding import resting_states
+
+    holding = [mode for mode in hybrid.modes if any(part.holds for part in mode.box.values())]
+    resting = (n for mode in holding for n in mode.box if n in resting_states(hybrid, mode))
+    places = (n for mode in holding for n, part in mode.box.items() if part.holds)
+    second = next(resting, next(places, None))
+    cut = [mode.box for mode in hybrid.modes if second is None or second in mode.box]
+    names = [*max(cut, key=len)]
+    second = second or names[-1]
+    return next((name for name in names if name != second), second), second
+
+
 def _label(mode: Mode, signal: str) -> str:
-    """The mode's interval of a signal; a mode that does not mind the signal holds in any."""
-    return mode.box[signal].label if signal in mode.box else "any"
+    """The mode's region of a signal; where it does not mind the signal, what it holds at."""
+    held = (region.label for region in mode.box.values() if region.holds)
+    return mode.box[signal].label if signal in mode.box else next(held, "any")

@@ -62,18 +62,18 @@ def overlay_figure(
     commands: np.ndarray,
     runs: Mapping[str, HybridRun],
 ) -> Figure:
-    """States of the plant, (n_x, n), with those of hybrid models; below, commands and modes.
+    """First states of the plant, (n_shown, n), with those of hybrid models; commands and modes.
 
     The modes are those of the first run, which belongs to ``hybrid``.
     """
     model, time_s = hybrid.model, sample_time_s * np.arange(plant.shape[1])
     first = next(iter(runs.values()))
+    rows = -(-len(plant) // 2)
     with styled():
-        figure = new_figure(PAGE_IN, 1.6 + 1.5 * -(-min(len(model.states), 4) // 2))
-        rows = -(-min(len(model.states), 4) // 2)
+        figure = new_figure(PAGE_IN, 1.6 + 1.5 * rows)
         grid = figure.add_gridspec(rows + 1, 2)
-        for k, name in enumerate(model.states[:4]):
-            axes = figure.add_subplot(grid[k // 2, k % 2])
+        for k, name in enumerate(model.states[: len(plant)]):
+            axes = figure.add_subplot(grid[k // 2, k % 2 if len(plant) > 1 else slice(None)])
             scale = display_scale(name)
             axes.plot(
                 time_s, scale.from_si(plant[k]), color=GREY, linestyle="-", linewidth=2.5,
@@ -90,7 +90,8 @@ def overlay_figure(
             below.set_ylabel(labelled(name))
         if len(model.commands) > 1:
             below.set_ylabel(f"commands ({display_unit(model.commands[0])})")
-            below.legend(fontsize=6)
+            above = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "borderaxespad": 0.1}
+            below.legend(fontsize=6, ncols=len(model.commands), columnspacing=1.0, **above)
         below.set_xlabel("time (s)")
         active = figure.add_subplot(grid[rows, 1])
         there = list(dict.fromkeys(first.modes))

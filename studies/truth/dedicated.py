@@ -128,9 +128,16 @@ def tank_curves(tank: Tank, command_v: np.ndarray, seed: int, length_s: float = 
     return [_tank_table(step_s, sent[:, k], read[:, k], tank, rng) for k in range(len(command_v))]
 
 
-def static_map(tank: Tank, seed: int, amplitude_v: float = 1.2, period_s: float = 20.0) -> Table:
-    """Two periods of a slow sine about the closed valve, 250 Hz, from ambient."""
-    step_s, valve_lag_s = 4e-3, 1 / (2 * np.pi * 100.0)
+def static_map(
+    tank: Tank,
+    seed: int,
+    amplitude_v: float = 1.2,
+    period_s: float = 20.0,
+    periods: float = 2.0,
+    step_s: float = 4e-3,
+) -> Table:
+    """Periods of a sine about the closed valve, by default two slow ones, from ambient."""
+    valve_lag_s = 1 / (2 * np.pi * 100.0)
 
     def command(t):
         return CLOSED_V + amplitude_v * np.sin(2 * np.pi * np.asarray(t) / period_s)
@@ -138,7 +145,7 @@ def static_map(tank: Tank, seed: int, amplitude_v: float = 1.2, period_s: float 
     def spool(t):
         return np.atleast_1d(command(max(t - valve_lag_s, 0.0)))
 
-    samples = round(2 * period_s / step_s)
+    samples = round(periods * period_s / step_s)
     true_pa = run(tank.network(spool, 1), np.array([[tank.ambient_pa]]), samples, step_s)
     sent = command(step_s * np.arange(samples))
     sent = np.round(sent / COMMAND_STEP_V) * COMMAND_STEP_V

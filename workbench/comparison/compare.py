@@ -85,6 +85,8 @@ class RecordingComparison:
         Gear shifts with the deviation measure of paper 003; none where there are no gears.
     notes
         What could not be done, and what of the recording does not fit the rig, in words.
+    window_s
+        Length of the windows, NaN where there are none.
     """
 
     name: str
@@ -100,6 +102,7 @@ class RecordingComparison:
     over_command: tuple[ErrorMap, ...] = ()
     shifts: tuple[ShiftDeviation, ...] = ()
     notes: tuple[str, ...] = ()
+    window_s: float = float("nan")
 
     @property
     def judged(self) -> str:
@@ -132,7 +135,7 @@ def _compared(rig: Rig, recording: Recording) -> RecordingComparison:
     ahead = simulated[_first_of((ONE_STEP, PLAIN), simulated)]
     errors = {name: measured[name] - judged[name] for name in measured}
     shifts, more = _shifts(course)
-    squared = _squared(errors)
+    squared, length_s = _squared(errors), window_length_s(plant, [recording])
     return RecordingComparison(
         name=recording.name,
         time_s=recording.time_s,
@@ -141,7 +144,7 @@ def _compared(rig: Rig, recording: Recording) -> RecordingComparison:
             for horizon, rows in simulated.items()
         },
         by_regime=_by_regime(course, squared),
-        worst=_worst(squared, recording.sample_time_s, window_length_s(plant, [recording])),
+        worst=_worst(squared, recording.sample_time_s, length_s),
         measured=measured,
         simulated=simulated,
         noise=noise,
@@ -153,11 +156,13 @@ def _compared(rig: Rig, recording: Recording) -> RecordingComparison:
         over_command=command_maps(course, errors),
         shifts=shifts,
         notes=(
+            *_pieces_in_words(recording),
             *notes,
             *more,
             *filter(None, (each.sentence for each in noise.values())),
             *map(str, examined(rig, recording)),
         ),
+        window_s=length_s if WINDOW in simulated else float("nan"),
     )
 
 
@@ -192,6 +197,15 @@ def _shifts(course: Course) -> tuple[tuple[ShiftDeviation, ...], list[str]]:
         return shift_deviations(course), notes
     except ArithmeticError as error:
         return (), [*notes, f"no deviation of the shifts: {error}"]
+
+
+def _pieces_in_words(recording: Recording) -> tuple[str, ...]:
+    """Where the pieces of a split recording begin: no time that is told counts its gaps."""
+    if len(recording.starts) < 2:
+        return ()
+    begins = ", ".join(f"{recording.sample_time_s * first:.4g}" for first in recording.starts)
+    told = f"{len(recording.starts)} pieces stand one behind the other"
+    return (f"{told}, from {begins} s on: times leave the gaps out",)
 
 
 def _squared(errors: Rows) -> np.ndarray:

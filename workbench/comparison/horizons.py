@@ -1,7 +1,8 @@
 """What a plant foretells of a recording, over three horizons, because positions integrate.
 
 one step    innovations of the extended Kalman filter: what is missed within one sample
-window      a fifth of a second with free start states: forces and flows stay visible, drift is cut
+window      short stretches with free start states, as a fit has them
+            (:mod:`workbench.fitting.window_length`): forces and flows stay visible, drift is cut
 free run    the whole recording from its first sample: what a user of a simulation feels
 
 A plant without states has one horizon, ``sample by sample``.

@@ -25,6 +25,7 @@ from workbench.units import public_name
 STILL_SPREAD = 2.0  # spread of a still block, in noise deviations
 STILL_SHARE = 0.02  # of the blocks: fewer still ones are chance
 SAME_NOISE = 1.3  # ratio of two estimates from which on they disagree
+FEWEST = BLOCK + 3  # samples for one block of third differences
 ASSUMED_SHARE = 1e-3  # of the range, where nothing shows
 
 
@@ -35,6 +36,7 @@ class NoiseSource(Enum):
     STILL = "still pieces"
     MOVING = "differences while it moves"
     UNCLEAR = "not told from motion"
+    SHORT = "the smallest step between two samples"
     ASSUMED = "a thousandth of the range"
 
 
@@ -55,6 +57,9 @@ class Noise:
             "neighbouring samples while it moves",
             NoiseSource.UNCLEAR: f"the noise of {output} could not be estimated: it is never "
             "still, and its motion is in the differences; the true noise is likely smaller",
+            NoiseSource.SHORT: f"the noise of {output} could not be estimated: it has fewer than "
+            f"{FEWEST} samples; the smallest step between two of them is taken, and the true noise "
+            "may be far larger",
             NoiseSource.ASSUMED: f"the noise of {output} could not be estimated: the recording "
             "shows none; a thousandth of its range is taken",
         }.get(self.source, "")
@@ -78,6 +83,8 @@ def _noise_of(recording: Recording, name: str) -> Noise:
 
 
 def _source(recording: Recording, name: str, noise: float) -> NoiseSource:
+    if np.isfinite(recording[name]).sum() < FEWEST:
+        return NoiseSource.SHORT
     blocks = _blocks(recording, name)
     if not len(blocks):
         return NoiseSource.UNCLEAR

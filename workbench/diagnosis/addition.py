@@ -13,7 +13,7 @@ from workbench.diagnosis.evidence import WARNINGS, Recordings, held_out, weighed
 from workbench.diagnosis.law import empirical_law, plant_with_terms
 from workbench.diagnosis.pairs import pair_fit
 from workbench.diagnosis.refit import refit
-from workbench.diagnosis.result import Diagnosis, Evidence, Law
+from workbench.diagnosis.result import Diagnosis, Evidence, Law, told
 from workbench.diagnosis.rough import rough_fit
 from workbench.diagnosis.scan import scan, scan_catalogue
 from workbench.diagnosis.where import locate
@@ -273,7 +273,8 @@ def addition(
     kind = ""
     if is_law(candidate.name):
         kind = f"empirical, not a physical effect, seen for {ranges_text(found.seen)}; "
-    falls = f"error {share:.0%} smaller in training, {unseen:.0%} in {evidence.value}"
+    trained, held = f"{told(share):.0%}", f"{told(unseen):.0%}"
+    falls = f"misfit beyond noise {trained} smaller in training, {held} in {evidence.value}"
     return Addition(
         rig=replace(found, notes=(*rig.notes, f"{candidate.name}: {kind}{falls}")),
         candidate=candidate,

@@ -25,6 +25,7 @@ from workbench.diagnosis.judge import (
     alignment,
     predicts,
     reasons_against,
+    share_removed,
 )
 from workbench.diagnosis.law import empirical_law
 from workbench.diagnosis.next_recording import recommended
@@ -52,6 +53,7 @@ SHIFTS_REFITTED = 2  # parameters that leave their priors
 WORTH_A_SHIFT = 0.25  # of the best refit
 LOCATED = 2  # candidates that are followed because they act where the smoother finds a lack
 IMITATED = 2  # candidates that are followed because they lead where no parameter has moved
+KEEPS = 0.75  # of its drop in training, held out: an effect that keeps less may be an imitation
 LEAVES_MUCH = 0.5  # of the misfit removed: below it, rivals are refitted from the leader's place
 
 Progress = Callable[[str], None]
@@ -238,14 +240,16 @@ def _law(
 
     A parameter that leaves its prior is no such effect: it may well imitate the law.  So the law
     is to leave a fifth less than the best effect, and only less than the best shift; what fails
-    another criterion than its share is no rival.
+    another criterion than its share is no rival.  The scan of an effect that keeps little of its
+    drop on what is held out bars no law.
     """
     leader = ranking[0] if ranking else None
     certain = leader and leader.accepted and leader.kind is Kind.EFFECT
-    if leader and certain and leader.drop_train >= CERTAIN_SHARE:
+    if leader and certain and share_removed(leader) >= CERTAIN_SHARE:
         return None
     progress("empirical law")
-    led_by = (p.drop for p in profiles if certain and p.candidate == leader.candidate)
+    keeps = certain and not leader.drop_validation < KEEPS * leader.drop_train
+    led_by = (p.drop for p in profiles if keeps and p.candidate == leader.candidate)
     law = empirical_law(problem, profiles, max(led_by, default=0.0), None if certain else where)
     followed = [r for r in ranking if r.accepted or r.reasons == (SHARE_REASON,)]
     effect, shift = (

@@ -92,7 +92,7 @@ def too_few(held_out: Fit | None) -> bool:
     return len(held_out.windows) < FEWEST_WINDOWS
 
 
-def share_removed(found: Refit | Law) -> float:
+def share_removed(found: Refit | Law | Ranked) -> float:
     """Share of the misfit that goes away, mean of training and held-out."""
     if isnan(found.drop_validation):
         return found.drop_train

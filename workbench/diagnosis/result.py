@@ -53,6 +53,11 @@ class DecidedBy(Enum):
     NOT_APPLICABLE = "not applicable"
 
 
+def told(share: float) -> float:
+    """A share of a misfit as it is told: an error that falls below the noise is all of it."""
+    return min(share, 1.0)
+
+
 @dataclass(frozen=True)
 class Size:
     """A fitted strength or form in SI, with its standard deviation."""

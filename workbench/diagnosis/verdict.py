@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from workbench.diagnosis.judge import SHARE_REASON
 from workbench.diagnosis.power import too_weak
-from workbench.diagnosis.result import NAMING, Evidence, Law, Ranked, Verdict
+from workbench.diagnosis.result import NAMING, Evidence, Law, Ranked, Verdict, told
 from workbench.diagnosis.scan import WIDER, Profile
 from workbench.fitting.errors import errors_of
 from workbench.fitting.gauss_newton import Fit
@@ -101,7 +101,7 @@ def _said(verdict: Verdict, ranking: tuple[Ranked, ...], law: Law | None) -> str
         return _too_weak(ranking)
     if leader is None or verdict not in NAMING:
         return "nothing in the catalogue earns its place"
-    name, share = _spoken(leader), f"{leader.drop_train:.0%}"
+    name, share = _spoken(leader), f"{told(leader.drop_train):.0%}"
     if verdict is Verdict.FOUND:
         if len(leader.candidate.singles) > 1:
             return f"{name} are missing: they remove {share} of the misfit beyond noise"

@@ -59,7 +59,7 @@ class InputPressure:
         self, valve: ProportionalValve, chamber: str, offset_v: Expression, now: Conditions
     ) -> Iterator[MassFlow]:
         gas, supply, outside = now[chamber], now["supply"], now["atmosphere"]
-        share = 0.5 + 0.5 * ca.tanh(pi * offset_v / valve.transition_v)
+        share = self.supply_share(valve, offset_v)
         inlet_pa = outside.pressure_pa + share * (supply.pressure_pa - outside.pressure_pa)
         ends = (inlet_pa, supply.temperature_k, gas.pressure_pa, gas.temperature_k)
         path = Path(*ends, valve.gas_constant_j_kg_k)
@@ -67,6 +67,11 @@ class InputPressure:
         into_kg_s = gas.line_share * path.flow_kg_s(hole_m2, NozzleLaw())
         yield MassFlow(chamber, into_kg_s, path.temperature_k, NozzleLaw()(path.ratio))
         yield MassFlow("supply", -share * into_kg_s, path.temperature_k)
+
+    @staticmethod
+    def supply_share(valve: ProportionalValve, offset_v: Expression) -> Expression:
+        """(P_in - P_E) / (P_S - P_E): 0 where the chamber is exhausted, 1 where it is charged."""
+        return 0.5 + 0.5 * ca.tanh(pi * offset_v / valve.transition_v)
 
 
 @dataclass(frozen=True)

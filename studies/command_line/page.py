@@ -1,0 +1,35 @@
+"""The command that serves the local page."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from studies.command_line.application import Spread, answering, app, example
+
+
+@app.command(cls=Spread, name="app", epilog=example("workbench app rig.toml train.csv"))
+def serve_page(
+    rig: Annotated[
+        Path | None, typer.Argument(metavar="[RIG]", help="Rig file (TOML).", show_default=False)
+    ] = None,
+    recordings: Annotated[
+        list[Path] | None, typer.Argument(metavar="[REC...]", help="Recordings.")
+    ] = None,
+    port: Annotated[
+        int | None, typer.Option("--port", metavar="N", min=1, max=65535, help="Usually 5006.")
+    ] = None,
+) -> None:
+    """The same loop as a local page: this machine alone, an address with a token of its own."""
+    with answering(quiet=True):
+        from workbench.errors import InputError, Message
+
+        try:
+            import bokeh  # noqa: F401
+        except ImportError:
+            what = "the page needs the package bokeh, which is not installed"
+            raise InputError(Message(what, expected="`pip install 'workbench[page]'`")) from None
+        from studies.page.server import serve
+
+        said = "the page is at {}\nwhoever has this address can use it; Ctrl-C ends it"
+        serve(rig, recordings or (), port, lambda address: typer.echo(said.format(address)))

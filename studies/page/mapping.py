@@ -1,0 +1,118 @@
+"""Which column is which signal, in which unit: written as a rig file, and read from then on."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from studies.page import tasks
+from studies.page.look import button, column, row, text
+from studies.page.plausibility import column_names
+from studies.page.replay import Action
+from studies.page.session import Session, mapped, paths, with_opened, with_rig
+from workbench.errors import InputError, whole_file
+from workbench.recording_format import channel_names
+from workbench.units import display_unit
+
+if TYPE_CHECKING:
+    from bokeh.models import Model
+
+    from studies.page.view import Page
+
+ABSENT = "(not recorded)"
+
+
+class Mapping:
+    """A line for each signal: the column of the file, and its unit there."""
+
+    def __init__(self, page: Page) -> None:
+        self._page = page
+        self._widgets: dict[str, tuple[Any, Any]] = {}
+        self._shown: Any = None
+
+    def build(self) -> Model:
+        """Its widgets, hidden until they are asked for."""
+        from bokeh.models import TextInput
+
+        self._lines = column()
+        self._name = TextInput(title="Write as rig file", width=360, name="mapped_file")
+        self._inner = column(
+            text("<p>Each signal of the plant, the column that holds it, and the unit there.</p>"),
+            self._lines,
+            row(self._name, button("Write and read with it", self._apply, name="apply_mapping")),
+        )
+        self._inner.visible = False
+        return column(
+            row(button("Columns and units", self._fold, name="columns_and_units")), self._inner
+        )
+
+    def _fold(self) -> None:
+        self._inner.visible = not self._inner.visible
+        self._fill()
+
+    def show(self, session: Session, opened: tasks.Opened | None) -> None:
+        """The mapping of the rig of a session."""
+        path = opened.path if opened else ""
+        if session.steps and self._shown != (session.now, path):
+            self._shown = (session.now, path)
+            stem = Path(session.steps[0].rig_file)
+            self._name.value = str(stem.with_name(f"{stem.stem}_columns.toml"))
+            self._fill()
+
+    def _fill(self) -> None:
+        """One line for each signal, once it is looked at."""
+        from bokeh.models import Select, TextInput
+
+        if not self._inner.visible or self._shown is None:
+            return
+        step, path = self._shown
+        known = [str(c.column) for c in step.rig.reader.channels.values()]
+        try:
+            columns = [*column_names(step.rig, Path(path))] if path else known
+        except InputError:
+            columns = known
+        self._widgets, lines = {}, []
+        for public, full in channel_names(step.rig.plant).items():
+            now = step.rig.reader.channels.get(full)
+            chosen = str(now.column) if now else ABSENT
+            select = Select(
+                title=public, value=chosen, width=220,
+                options=list(dict.fromkeys([ABSENT, chosen, *columns])),
+            )  # fmt: skip
+            unit = TextInput(title="unit", value=now.unit if now else display_unit(full), width=110)
+            self._widgets[full] = (select, unit)
+            lines.append(row(select, unit))
+        self._lines.children = lines
+
+    def _apply(self) -> None:
+        page, target = self._page, self._name.value.strip()
+        chosen = {
+            full: (select.value, unit.value.strip())
+            for full, (select, unit) in self._widgets.items()
+            if select.value != ABSENT
+        }
+
+        def change(session: Session) -> Session:
+            content = mapped(session.now.rig, chosen)
+            with whole_file(Path(target)) as unfinished:
+                unfinished.write_text(content, encoding="utf-8")
+            lines = f"from pathlib import Path\nPath({target!r}).write_text({content!r})\n"
+            found = with_rig(session, target)
+            last = found.actions[-1]
+            return replace(found, actions=(*found.actions[:-1], Action("", lines + last.python)))
+
+        before = page.session.files
+        if page.attempt(change) and before:
+            roles = {each.opened.path: each.role for each in before}
+
+            def reread(found: tuple[tasks.Opened, ...]) -> Any:
+                def with_all(session: Session) -> Session:
+                    for each in found:
+                        session = with_opened(session, [each], roles[each.path])
+                    return session
+
+                return with_all
+
+            every = tuple(paths([each.opened for each in before]))
+            page.work(Action("", ""), reread, tasks.open_recordings, page.session.now.rig, every)

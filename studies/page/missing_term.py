@@ -1,0 +1,100 @@
+"""The term that is missing in a balance, in N or l/min, over time and against what drives it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from studies.figures.style import BLUE, RED
+from studies.page.decimation import peaks
+from studies.page.look import MEASURED, chart, column, put, row, sharing, text
+from studies.text import labelled, percent
+from workbench.units import display_scale, display_unit, public_name, suffix
+
+if TYPE_CHECKING:
+    from bokeh.models import Model
+
+    from workbench.diagnosis.missing_term import Dependence
+    from workbench.diagnosis.result import Where
+
+ANR_KG_M3 = 1.185  # air at 20 degC, 1 bar and 65 % humidity: ISO 8778, as flows are read in l/min
+HEIGHT, SHOWN, MOST_POINTS = 190, 3, 2000
+LITRES_PER_MIN = 6e4 / ANR_KG_M3
+
+
+class MissingTerm:
+    """Which balance lacks something, the term over time, and over its drivers."""
+
+    def build(self) -> Model:
+        """Its widgets."""
+        self._head, self._charts = text(), column()
+        return column(self._head, self._charts)
+
+    def show(self, where: Where | None) -> None:
+        """The missing term of a diagnosis."""
+        put(self._head, "")
+        self._charts.children = []
+        if where is None:
+            return
+        factor, unit = in_people(where.term_name)
+        name = public_name(where.balance).replace("_", " ").replace(".", " ")
+        flow = public_name(where.term_name).replace("_", " ")
+        told = f"What an unknown {flow} would have to be ({unit}), one deviation shaded."
+        head = f"<h2>Where the plant fails: the balance {name}</h2>"
+        put(self._head, f'{head}<p class="guide">{told}</p>')
+        strongest = [each for each in where.against if each.bins.shape[1]][:SHOWN]
+        below = [_dependence(each, factor, unit) for each in strongest]
+        for each in below:
+            sharing(each, 1, 260)
+        gained, term = _balances(where), _over_time(where, factor, unit)
+        first = row(sharing(gained, 1, 320), sharing(term, 2, 520))
+        self._charts.children = [first, row(*below, top=True)]
+
+
+def in_people(name: str) -> tuple[float, str]:
+    """Factor from SI and unit of a missing term: N for forces, l/min (ANR) for mass flows."""
+    if suffix(name) == "kg_s":
+        return LITRES_PER_MIN, "l/min ANR"
+    return 1.0 / display_scale(name).factor, display_unit(name)
+
+
+def _balances(where: Where) -> Any:
+    """Log-likelihood that an unknown flow gains, by balance."""
+    from bokeh.models import FactorRange
+
+    gains = sorted(where.by_balance.items(), key=lambda item: item[1])[-8:]
+    names = [name.replace(".", " ").replace("_", " ") for name, _ in gains]
+    found = chart(
+        "gained log-likelihood (-)", "", HEIGHT, "which balance lacks something",
+        y_range=FactorRange(*names), tools="",
+    )  # fmt: skip
+    colours = [RED if name == where.balance else MEASURED for name, _ in gains]
+    found.hbar(names, height=0.6, right=[max(g, 0.0) for _, g in gains], color=colours)
+    return found
+
+
+def _over_time(where: Where, factor: float, unit: str) -> Any:
+    rows = np.array([where.term, where.term - where.term_deviation])
+    kept = peaks(rows, 0, rows.shape[1], MOST_POINTS)
+    time, term = where.time_s[kept], factor * where.term[kept]
+    spread = factor * where.term_deviation[kept]
+    found = chart("time (s)", f"missing ({unit})", HEIGHT, "the missing term over time")
+    found.varea(time, term - spread, term + spread, color=BLUE, alpha=0.25)
+    found.line(time, term, color=BLUE, line_width=1.2)
+    return found
+
+
+def _dependence(each: Dependence, factor: float, unit: str) -> Any:
+    """Means of the term in bins of one driver, without what parameters explain."""
+    rated, plain = each.variable.startswith("rate of "), each.variable.removeprefix("rate of ")
+    per = 1.0 / display_scale(plain).factor
+    centres, means, spreads = each.bins * np.array([[per], [factor], [factor]])
+    shown = labelled(plain)
+    label = f"rate of {shown[:-1]}/s)" if rated else shown
+    title = f"follows {public_name(plain).replace('_', ' ')}: {percent(each.explains)}"
+    found = chart(label, f"missing ({unit})", HEIGHT, title, tools="")
+    found.varea(centres, means - spreads, means + spreads, color=BLUE, alpha=0.25)
+    found.line(centres, means, color=BLUE, line_width=1.5)
+    found.scatter(centres, means, color=BLUE, size=5)
+    return found

@@ -1,0 +1,212 @@
+"""One browser tab: its session, the job that runs for it, and what all tabs of the page share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from html import escape
+from pathlib import Path
+from time import strftime
+from typing import TYPE_CHECKING, Any, Protocol
+
+from studies.page.jobs import Job
+from studies.page.look import CHOICE, button, column, put, row, sheet, text
+from studies.page.replay import Action, write_script
+from studies.page.session import Session
+from workbench.errors import InputError
+
+if TYPE_CHECKING:
+    from bokeh.document import Document
+    from bokeh.models import Model
+
+POLL_MS = 200
+SHOWN = 240  # letters of a line of Python
+COPY = "navigator.clipboard.writeText(said.text)"
+
+Change = Callable[[Session], Session]
+
+
+class Tab(Protocol):
+    """One tab: built when it is first looked at, shown again when the session is another one."""
+
+    title: str
+
+    def build(self) -> Model:
+        """Its widgets."""
+
+    def show(self, session: Session) -> None:
+        """What it shows of a session."""
+
+
+class Page:
+    """One browser tab with a session of its own; nothing of it is shared with another one."""
+
+    def __init__(self, document: Document, tabs: Callable[[Page], list[Tab]]) -> None:
+        self.document, self.session = document, Session()
+        self._tabs = tabs(self)
+        self._shown: dict[int, Session] = {}
+        self._job: Job | None = None
+        self._then: Callable[[Any], Change] | None = None
+        self._polling: Any = None
+        self._replay = Path(f"workbench_replay_{strftime('%Y%m%d_%H%M%S')}_{id(self) % 9973}.py")
+        self._build()
+        document.on_session_destroyed(self._closed)
+
+    def _build(self) -> None:
+        from bokeh.models import CustomJS, PreText, RadioButtonGroup
+
+        self._head, self._status = text(), text(visible=True)
+        self._cancel = button("Cancel", self.cancel, visible=False, name="cancel")
+        labels = [f"{k} {tab.title}" for k, tab in enumerate(self._tabs, start=1)]
+        self._choice = RadioButtonGroup(
+            labels=labels,
+            active=0,
+            stylesheets=[sheet(CHOICE)],
+            name="tabs",
+            sizing_mode="stretch_width",
+        )
+        self._choice.on_change("active", lambda _a, _o, _n: self.refresh())
+        self._panels = [column() for _ in self._tabs]
+        self._command, self._python = (PreText(text="", visible=False) for _ in range(2))
+        self._done = text()
+        copies = [
+            button(label, lambda: None, name=name, width=170)
+            for label, name in (("Copy as command", "copy_command"), ("Copy as Python", "copy_py"))
+        ]
+        for each, said in zip(copies, (self._command, self._python), strict=True):
+            each.js_on_click(CustomJS(args={"said": said}, code=COPY))
+        whole = column(
+            self._head,
+            self._choice,
+            row(self._status, self._cancel),
+            *self._panels,
+            row(*copies),
+            self._done,
+            self._command,
+            self._python,
+        )
+        whole.styles = {"padding": "12px 20px", "max-width": "1600px", "box-sizing": "border-box"}
+        self.document.add_root(whole)
+        self.document.title = "workbench"
+        self.refresh()
+        self.calm()
+
+    def become(self, session: Session) -> None:
+        """Another session; its replay script is written once something was done."""
+        done = session.actions != self.session.actions
+        self.session = session
+        if done and any(each.command for each in session.actions):
+            try:
+                write_script(session.actions, self._replay)
+            except OSError as error:
+                self.complain(f"the replay script cannot be written: {error}")
+        if session.actions:
+            self.tell(session.actions[-1])
+        self.refresh()
+
+    def attempt(self, change: Change) -> bool:
+        """Another session, or what stands against it in words."""
+        if self._job is not None:
+            self.complain("something is running: wait for it, or cancel it")
+            return False
+        try:
+            self.become(change(self.session))
+        except (InputError, ValueError, OSError, ArithmeticError) as error:
+            self.complain(str(error))
+            return False
+        self.calm()
+        return True
+
+    def work(
+        self,
+        action: Action,
+        then: Callable[[Any], Change],
+        task: Callable[..., Any],
+        *arguments: Any,
+    ) -> None:
+        """Start a job for an action; ``then`` makes a change of the session from its result."""
+        if self._job is not None:
+            self.complain("something is running: wait for it, or cancel it")
+            return
+        if action.command:
+            self.tell(action)
+        self.follow(Job(task, *arguments), then)
+
+    def follow(self, job: Job, then: Callable[[Any], Change]) -> None:
+        """Show a job while it runs."""
+        self._job, self._then = job, then
+        self._cancel.visible = True
+        self._polling = self.document.add_periodic_callback(self._poll, POLL_MS)
+        self._poll()
+
+    def _poll(self) -> None:
+        job = self._job
+        if job is None:
+            return
+        told = job.look()
+        if not told.ended:
+            last = told.progress[-1] if told.progress else "starting"
+            self._status.text = f'<p class="busy" role="status">{escape(last)} &middot; ' + (
+                f"{job.elapsed_s:.0f} s</p>"
+            )
+            return
+        then, self._job = self._then, None
+        self._stop_polling()
+        if told.refused:
+            self.complain(told.refused)
+        elif then is not None and self.attempt(then(told.result)) and told.warned:
+            said = "\n".join(dict.fromkeys(told.warned))
+            self._status.text = f'<p class="warned" role="status">{escape(said)}</p>'
+
+    def _stop_polling(self) -> None:
+        self._cancel.visible = False
+        if self._polling is not None:
+            self.document.remove_periodic_callback(self._polling)
+            self._polling = None
+
+    def cancel(self) -> None:
+        """End the running job; what was there stays."""
+        if self._job is not None:
+            self._job.cancel()
+            self._poll()
+
+    def _closed(self, _: Any) -> None:
+        """The browser is gone: its job has nobody to work for."""
+        if self._job is not None:
+            self._job.cancel()
+            self._job = None
+
+    def complain(self, message: str) -> None:
+        """Say what is wrong."""
+        self._status.text = f'<p class="wrong" role="alert">{escape(message)}</p>'
+
+    def calm(self) -> None:
+        """Say that nothing runs."""
+        self._status.text = '<p class="calm" role="status">ready</p>'
+
+    def tell(self, action: Action) -> None:
+        """The action as a command line and as Python, to be copied."""
+        self._command.text, self._python.text = action.command, action.python
+        said = f"<pre>$ {escape(action.command)}</pre>" if action.command else ""
+        python = "".join(
+            f"<pre>&gt;&gt;&gt; {escape(_short(x))}</pre>" for x in action.python.split("\n")
+        )
+        kept = f'<p class="guide">all actions as a script: {self._replay}</p>'
+        put(self._done, said + python + (kept if self._replay.exists() else ""))
+
+    def refresh(self) -> None:
+        """Show the chosen tab, where the session is another one than it shows."""
+        rig = f": {escape(self.session.now.rig.name)}" if self.session.steps else ""
+        put(self._head, f"<h1>workbench{rig}</h1>")
+        active = self._choice.active or 0
+        for k, panel in enumerate(self._panels):
+            panel.visible = k == active
+        if not self._panels[active].children:
+            self._panels[active].children = [self._tabs[active].build()]
+        if self._shown.get(active) is not self.session:
+            self._shown[active] = self.session
+            self._tabs[active].show(self.session)
+
+
+def _short(line: str) -> str:
+    """A line as far as it tells something; what is copied is whole."""
+    return line if len(line) <= SHOWN else f"{line[:SHOWN]} ..."
