@@ -74,10 +74,13 @@ class Robustness:
     ----------
     deviations
         By parameter, shape (n,), in its standard deviations.
+    each
+        What one of them is called.
     """
 
     lines: tuple[Line, ...]
     deviations: Mapping[str, np.ndarray]
+    each: str = "draw"
 
     def influences(self, line: Line) -> tuple[tuple[str, float], ...]:
         """(parameter, rank correlation) of those that clearly matter, the strongest first."""
@@ -116,6 +119,8 @@ class Robustness:
     def told(self, draw: int) -> str:
         """The parameters of one draw that were farthest off."""
         off = {name: float(each[draw]) for name, each in self.deviations.items()}
+        if not any(off.values()):
+            return f"{self.each} {draw + 1}: the rig's own values"
         farthest = sorted(off, key=lambda name: -abs(off[name]))[: MOST_NAMED + 2]
         words = (f"{public_name(name)} {off[name]:+.1f} sd" for name in farthest)
-        return f"draw {draw + 1}: " + ", ".join(words)
+        return f"{self.each} {draw + 1}: " + ", ".join(words)
