@@ -145,10 +145,9 @@ class CheckedRuns:
 
     def figures(self) -> dict[str, Figure]:
         """The loops of few runs, or of the first and the worst, closed again; of many a spread."""
-        numbers = range(len(self.rows))
+        numbers = [*range(len(self.rows))]
         if len(self.rows) > FEW:
-            worst = (int(line.worst[0]) for line in self.robustness.lines)
-            numbers = [*dict.fromkeys((0, *worst))][: 1 + WORST_DRAWN]
+            numbers = sorted({0, *self.robustness.worst[:WORST_DRAWN]})
         kind, _ = _kind(self.setup.rig)
         rows, records = [], []
         for number in numbers:
@@ -183,16 +182,13 @@ class CheckedRuns:
             yield place, _line_of(verdict, self._called(*place))
 
     def _goals(self) -> Iterator[tuple[tuple[str, str, str], Line]]:
-        """Missed or not; a scenario in which nothing can be missed but a loop lost is left out."""
-        rows = iter(self.found.rows)
-        reached = [next(rows).reached if "metrics" in loop else False for _, loop in self._loops()]
-        each = len(self.rows[0]["loops"])
-        for place, loop in enumerate(self.rows[0]["loops"]):
-            answers = reached[place::each]
-            if any(answer is not None for answer in answers):
-                missed = np.array([answer is False for answer in answers])
-                key = ("goal", loop["scenario"], loop["estimator"])
-                yield key, Line(self._called(*key), "reached", missed.astype(float), missed)
+        """Missed, 1, or not, 0; a reference that does not end at rest is only missed if lost."""
+        rows, first = iter(self.found.rows), self.rows[0]["loops"]
+        answers = [next(rows).reached if "metrics" in loop else False for _, loop in self._loops()]
+        missed = np.array([answer is False for answer in answers]).reshape(-1, len(first))
+        for loop, each in zip(first, missed.T, strict=True):
+            key = ("goal", loop["scenario"], loop["estimator"])
+            yield key, Line(self._called(*key), "not missed", each.astype(float), each)
 
     def _called(self, line: str, scenario: str, estimator: str) -> str:
         several = len({loop["estimator"] for loop in self.rows[0]["loops"]}) > 1
@@ -234,7 +230,7 @@ def _line_of(verdict: Verdict, name: str) -> Line:
     """A line as its figure in the typed unit; of one with two ends, how far beyond them."""
     asked, found = verdict.asked, np.array(verdict.found)
     if _two_sided(verdict):
-        name, values = f"{name} (beyond)", [asked.excess(v) / asked.scale.factor for v in found]
+        name, values = f"{name}, beyond", [asked.excess(v) / asked.scale.factor for v in found]
     else:
         values = asked.scale.from_si(np.where(np.isfinite(found), np.abs(found), inf))
     return Line(name, asked.text, np.array(values), ~np.array(verdict.met), asked.unit)

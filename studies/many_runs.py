@@ -27,6 +27,7 @@ from studies.verdicts import drawn_values
 from studies.workers import Workers
 from workbench.errors import InputError, Message
 from workbench.law_range import beyond
+from workbench.plant import Plant
 from workbench.plant_files import plant_named
 from workbench.rig import Rig
 
@@ -136,7 +137,7 @@ def worked(piece: Piece) -> Row:
     with warnings.catch_warnings():  # the process that asks for rows has built it before
         warnings.simplefilter("ignore")
         loops = setup.loops
-    plant = drawn_plant(setup.rig, number)
+    plant = _plant(setup, number)
     off = {name: deviations for name, (_, deviations) in drawn_values(setup.rig, plant).items()}
     rows, said = [], []
     for part, found in zip(loops.apart, closed(setup, number), strict=True):
@@ -159,11 +160,16 @@ def closed(setup: Setup, number: int) -> tuple[Checked | str, ...]:
 
     The last run is remembered, so that its figures need no other.
     """
-    plant = drawn_plant(setup.rig, number)
+    plant = _plant(setup, number)
     return tuple(_once(part, plant, number) for part in setup.loops.apart)
 
 
-def _once(part: Loops, plant: Any, number: int) -> Checked | str:
+@lru_cache(maxsize=1)
+def _plant(setup: Setup, number: int) -> Plant:
+    return drawn_plant(setup.rig, number)
+
+
+def _once(part: Loops, plant: Plant, number: int) -> Checked | str:
     try:
         return part.once(plant, number)
     except (ArithmeticError, np.linalg.LinAlgError) as error:

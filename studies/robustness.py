@@ -103,9 +103,14 @@ class Robustness:
         """A row per line, and the parameters of the worst draws."""
         head = ("line", "asked", "median", "95 %", "worst", "missed by", "probability", "moved by")
         rows = [self._row(line) for line in self.lines]
-        worst = dict.fromkeys(int(k) for line in self.lines for k in line.worst[:1])
-        told = [self.told(draw) for draw in [*worst][:WORST_SHOWN]]
+        told = [self.told(draw) for draw in self.worst[:WORST_SHOWN]]
         return "\n".join([columns(head, rows), *told])
+
+    @property
+    def worst(self) -> tuple[int, ...]:
+        """The worst draw of each line, that of the line most often missed first."""
+        lines = sorted(self.lines, key=lambda line: -line.probability)
+        return tuple(dict.fromkeys(int(line.worst[0]) for line in lines))
 
     def _row(self, line: Line) -> Sequence[str]:
         low, high = line.interval

@@ -4,37 +4,22 @@ import json
 import pickle
 import sys
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from check_loops import MASS, RIG, SPEC, heavy_is_slow, record
 from commands import call
 
-from controllers.design_file import design, write_design
-from studies.checked_runs import FEW, CheckedRuns, check_rig
+from studies.checked_runs import CheckedRuns, check_rig
 from studies.checking import Loops, drawn_plant
-from studies.closed_loop_check import Check
-from studies.closed_loop_metrics import Metrics
 from studies.following_check import Followed, FollowingCheck
 from studies.many_runs import Piece, Setup, rows_of, worked
 from studies.specification import read_specification
 from studies.workers import Workers
 from workbench.errors import InputError
-from workbench.recording import Recording
 from workbench.rig import default_rig, load_rig
 
-RIG = default_rig("servo_drive")
-SPEC = 'rise_time = "150 ms"\nair = "2 g"\n[limits]\nchamber_a.pressure = ["1.2 bar", "7 bar"]\n'
 TIMES = ("solve_median_s", "solve_p99_s", "estimate_median_s")
-MASS = "slide.mass_kg"
-
-
-@pytest.fixture(scope="module")
-def lq(tmp_path_factory):
-    """A design file."""
-    path = tmp_path_factory.mktemp("runs") / "lq.toml"
-    write_design(design("lq", RIG.plant), path)
-    return path
 
 
 @pytest.fixture
@@ -53,25 +38,6 @@ def timeless(rows):
             for name in TIMES:
                 loop.get("metrics", {}).pop(name, None)
     return found
-
-
-def metrics(**figures):
-    """Of a step that reaches the goal, but for these figures."""
-    good = dict.fromkeys(vars(Metrics("", "", "", *[0.0] * 13)), 0.0)
-    labels = dict(design="lq", estimator="ekf", scenario="step", amplitude_m=float("nan"))
-    return Metrics(**{**good, **labels, **figures})
-
-
-def record(pressure_pa=2e5):
-    """A run in which this pressure stood."""
-    channels = {"chamber_a.pressure_pa": np.full(3, pressure_pa)}
-    return SimpleNamespace(recording=Recording("run", 1e-3, channels))
-
-
-def heavy_is_slow(loops, plant, seed):
-    """A loop whose rise takes longer with a heavier slide; 150 ms at half a deviation."""
-    off = (plant.values[MASS] / RIG.plant.values[MASS] - 1.0) / 0.05
-    return Check((metrics(rise_s=0.145 + 0.01 * off),), (record(),))
 
 
 def lost_at(number, error, loops, plant, seed):
@@ -201,54 +167,6 @@ def test_the_only_run_that_is_lost_is_an_error(lq, monkeypatch):
     monkeypatch.setattr(Loops, "once", lambda *given: lost_at(0, lost, *given))
     with pytest.raises(ArithmeticError, match="not finite"):
         check_rig(RIG, lq, ["ekf"], ["step"])
-
-
-def test_many_runs_say_how_often_a_line_is_missed_where_and_by_what(lq, monkeypatch):
-    monkeypatch.setattr(Loops, "once", heavy_is_slow)
-    asked = read_specification(SPEC, RIG)
-    found = check_rig(RIG, lq, ["ekf"], ["step"], spec=asked, runs=100)
-    rise, air, pressure = found.document["robustness"]
-    masses = [drawn_plant(RIG, k).values[MASS] for k in range(100)]
-
-    assert rise["probability"] == np.mean(0.145 + 0.2 * (np.array(masses) / 2.22 - 1.0) > 0.15)
-    assert rise["interval"][0] < rise["probability"] < rise["interval"][1]
-    assert rise["influences"]["slide.mass"] == pytest.approx(1.0)
-    assert rise["worst_run"] == 1 + int(np.argmax(masses))
-    assert air["probability"] == pressure["probability"] == 0.0
-    assert {"line", "scenario", "asked", "found_by_run"} <= set(found.document["specification"][0])
-    assert len(found.document["runs"]) == 100
-    assert f"run {rise['worst_run']}: slide.mass +" in found.text
-    assert "slide.mass +1.00" in found.text and "limits.chamber_a.pressure, step (be" in found.text
-    assert len(found.text.splitlines()) < 10
-
-
-def test_few_runs_are_told_one_by_one(lq, monkeypatch):
-    monkeypatch.setattr(Loops, "once", heavy_is_slow)
-    told = check_rig(RIG, lq, ["ekf"], ["step"], runs=FEW).text.splitlines()
-
-    assert [line.split()[:2] for line in told[1:]] == [["lq", str(k + 1)] for k in range(FEW)]
-
-
-def test_figures_close_the_first_and_the_worst_loops_again_and_no_others(stepping, lq, monkeypatch):
-    again = []
-
-    def noted(loops, plant, seed):
-        again.append(seed)
-        n = 3000
-        names = ("slide.position_m", "reference.slide.position_m", "valve.command_v")
-        channels = dict.fromkeys(names, np.linspace(0.1, 0.2, n))
-        return Check(
-            heavy_is_slow(loops, plant, seed).rows,
-            (SimpleNamespace(recording=Recording("run", 1e-3, channels)),),
-        )
-
-    monkeypatch.setattr(Loops, "once", heavy_is_slow)
-    asked = read_specification('rise_time = "150 ms"\n', RIG)
-    found = check_rig(RIG, lq, ["ekf"], ["step"], spec=asked, runs=FEW + 8)
-    monkeypatch.setattr(Loops, "once", noted)
-
-    assert set(found.figures()) == {"closed_loop_step", "influences", "spread"}
-    assert again == [0, found.document["robustness"][0]["worst_run"] - 1]
 
 
 def test_figures_of_a_plant_with_a_bench_come_back_from_their_rows(lq, monkeypatch):
