@@ -70,7 +70,12 @@ def write_design(found: Design, path: Path) -> None:
 
 
 def read_design(path: Path) -> Design:
-    """The design of a file, built anew.
+    """The design of a file, built anew; as :func:`parse_design`."""
+    return parse_design(path.read_text(encoding="utf-8"), path)
+
+
+def parse_design(text: str, path: Path) -> Design:
+    """The design that the text of a file holds, built anew; ``path`` is where it lies.
 
     Raises
     ------
@@ -80,7 +85,7 @@ def read_design(path: Path) -> Design:
         If it names something that does not exist.
     """
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        content = tomllib.loads(text)
         method, place = content["controller"], content["plant"]
         plant = with_laws(plant_named(place["name"], path.parent), place.get("laws", ()))
         plant = plant.without(*place["removed"]).with_values(place["values"])

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterable
-from dataclasses import replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from math import isclose
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from controllers.design_file import read_design
+from controllers.design_file import parse_design
+from estimators import ESTIMATORS
 from linearize.standard import SHIFT_MODES, SLIDE_MODES
 from studies.closed_loop_check import Check, check
 from studies.closed_loop_figures import check_figures
@@ -19,13 +20,12 @@ from studies.figures.following import following_figures
 from studies.figures.shifts import shift_figures
 from studies.figures.style import styled
 from studies.following import BENCHES
-from studies.following_check import FollowingCheck, check_followed, tasks_of
+from studies.following_check import RAW, FollowingCheck, check_followed, tasks_of
 from studies.scenarios import SCENARIOS
 from studies.shift_check import SHIFTS, ShiftCheck, check_shifts
 from studies.text import shown
 from workbench.contracts import Controller
 from workbench.errors import InputError, Message, listed
-from workbench.law_range import warn_beyond
 from workbench.plant import Plant, require
 from workbench.rig import Rig
 from workbench.units import public_name
@@ -33,118 +33,107 @@ from workbench.units import public_name
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+Checked = Check | ShiftCheck | FollowingCheck
+USUAL = "ekf"
 DRAWS = 1000  # of one parameter until it lies within its bounds
 MOST_NAMED = 5  # values that differ from those of a design
 
 
-def check_rig(
-    rig: Rig,
-    designs: Iterable[Path],
-    estimators: Iterable[str],
-    scenarios: Iterable[str] = (),
-    runs: int = 1,
-    progress: Callable[[str], None] = lambda message: None,
-) -> Check:
-    """Designs of files against the rig's plant; from the second run on, against drawn ones.
+@dataclass(frozen=True)
+class Loops:
+    """All that one run of a check closes; :func:`loops_of` makes it and refuses what is wrong.
 
-    Raises
-    ------
-    InputError
-        If a scenario or an estimator does not exist, the plant has no standard modes, or a design
-        is for another plant.
+    Attributes
+    ----------
+    rig
+        What designs and estimators know; the plant of a run may be another one.
+    controllers
+        By the name of their file.
+    estimators
+        By name; none for a plant that shifts, whose filter is its own.
+    scenarios
+        Of the plant, by name.
     """
-    names = tuple(scenarios) or tuple(SCENARIOS)
-    require(names, SCENARIOS, "the list of scenarios")
-    controllers = _controllers(rig, designs)
-    rows, records = [], []
-    for number, plant in enumerate(drawn_plants(rig, runs)):
-        progress(f"closed loop, run {number + 1} of {runs}")
-        found = check(plant, controllers, estimators, names, believed=rig.plant, seed=number)
-        for row, record in zip(found.rows, found.records, strict=True):
-            run = f"{row.scenario} with {row.design}"
-            warn_beyond(rig, replace(record.recording, name=run))
-        mark = f" {number + 1}" if runs > 1 else ""
-        rows += [replace(row, design=row.design + mark) for row in found.rows]
-        records += found.records
-    return Check(tuple(rows), tuple(records))
 
+    rig: Rig
+    controllers: Mapping[str, Controller]
+    estimators: tuple[str, ...]
+    scenarios: tuple[str, ...]
 
-def shifts_gears(rig: Rig) -> bool:
-    """True for a plant that shifts between dedicated positions, which is checked in shifts."""
-    return rig.plant.name in SHIFT_MODES
+    def once(self, plant: Plant, seed: int) -> Checked:
+        """Every controller with every estimator in every scenario on this plant.
 
-
-def check_gears(
-    rig: Rig,
-    designs: Iterable[Path],
-    scenarios: Iterable[str] = (),
-    runs: int = 1,
-    progress: Callable[[str], None] = lambda message: None,
-) -> ShiftCheck:
-    """As :func:`check_rig` for an actuator that shifts; its estimator is the shift filter.
-
-    Raises
-    ------
-    InputError
-        If a shift does not exist, or a design is for another plant.
-    """
-    names = tuple(scenarios) or tuple(SHIFTS)
-    require(names, SHIFTS, "the list of shifts")
-    controllers = _controllers(rig, designs)
-    rows, records = [], []
-    for number, plant in enumerate(drawn_plants(rig, runs)):
-        progress(f"shifts, run {number + 1} of {runs}")
-        found = check_shifts(plant, controllers, names, believed=rig.plant, seed=number)
-        mark = f" {number + 1}" if runs > 1 else ""
-        rows += [replace(row, design=row.design + mark) for row in found.rows]
-        records += found.records
-    return ShiftCheck(tuple(rows), tuple(records))
-
-
-def follows(rig: Rig) -> bool:
-    """True for a plant that is checked on a bench of its own: rig, arm, leg, soft joint."""
-    return rig.plant.name in BENCHES
-
-
-def check_follower(
-    rig: Rig,
-    designs: Iterable[Path],
-    estimators: Iterable[str],
-    scenarios: Iterable[str] = (),
-    runs: int = 1,
-    progress: Callable[[str], None] = lambda message: None,
-) -> FollowingCheck:
-    """As :func:`check_rig` for a plant with a bench of its own, see :mod:`studies.following`.
-
-    Raises
-    ------
-    InputError
-        If a task or an estimator does not exist, or a design is for another plant.
-    """
-    tasks = tasks_of(rig.plant)
-    names = tuple(scenarios) or tuple(tasks)
-    require(names, tasks, "the list of scenarios")
-    controllers = _controllers(rig, designs)
-    rows, records = [], []
-    for number, plant in enumerate(drawn_plants(rig, runs)):
-        progress(f"closed loop, run {number + 1} of {runs}")
-        found = check_followed(
-            plant, controllers, estimators, names, believed=rig.plant, seed=number
+        Raises
+        ------
+        ArithmeticError
+            If a loop is lost.
+        """
+        believed, name = self.rig.plant, self.rig.plant.name
+        if name in SHIFT_MODES:
+            return check_shifts(
+                plant, self.controllers, self.scenarios, believed=believed, seed=seed
+            )
+        closed = check_followed if name in BENCHES else check
+        return closed(
+            plant, self.controllers, self.estimators, self.scenarios, believed=believed, seed=seed
         )
-        mark = f" {number + 1}" if runs > 1 else ""
-        rows += [replace(row, design=row.design + mark) for row in found.rows]
-        records += found.records
-    return FollowingCheck(tuple(rows), tuple(records))
+
+    @property
+    def apart(self) -> tuple[Loops, ...]:
+        """One estimator in one scenario each, in the order of the rows of one design."""
+        estimators = [(name,) for name in self.estimators] or [()]
+        return tuple(
+            replace(self, estimators=estimator, scenarios=(scenario,))
+            for estimator in estimators
+            for scenario in self.scenarios
+        )
 
 
-def _controllers(rig: Rig, designs: Iterable[Path]) -> dict[str, Controller]:
-    """The controllers of design files by the file's name; warns where they are for other values."""
-    name = rig.plant.name
+def loops_of(
+    rig: Rig,
+    designs: Mapping[Path, str],
+    estimators: Iterable[str] = (),
+    scenarios: Iterable[str] = (),
+) -> Loops:
+    """The loops of design files; warns where one is for other values than those of the rig.
+
+    Parameters
+    ----------
+    designs
+        Text by path.
+    estimators, scenarios
+        By default the extended Kalman filter, and all of the plant.
+
+    Raises
+    ------
+    InputError
+        If a scenario or an estimator does not exist, the plant has no standard modes or brings its
+        own estimator, or a design is for another plant.
+    """
+    name, wanted = rig.plant.name, tuple(estimators)
     known = (*SLIDE_MODES, *SHIFT_MODES, *BENCHES)
     if name not in known:
         expected = f"a rig of {listed(known)}"
         raise InputError(Message(f"{name} has no standard modes to control", rig.name, expected))
-    read = {path: read_design(path) for path in designs}
+    if name in SHIFT_MODES and wanted:
+        what = f"{rig.name} has an estimator of its own: leave --estimator out"
+        raise InputError(Message(what))
+    there = SHIFTS if name in SHIFT_MODES else SCENARIOS
+    there = tasks_of(rig.plant) if name in BENCHES else there
+    chosen = tuple(scenarios) or tuple(there)
+    require(chosen, there, "the list of scenarios")
+    if name not in SHIFT_MODES:
+        wanted = wanted or (USUAL,)
+        require(
+            wanted, (*ESTIMATORS, *((RAW,) if name in BENCHES else ())), "the list of estimators"
+        )
+    return Loops(rig, _controllers(rig, designs), wanted, chosen)
+
+
+def _controllers(rig: Rig, designs: Mapping[Path, str]) -> dict[str, Controller]:
+    """The controllers of design files by the file's name; warns where they are for other values."""
+    name = rig.plant.name
+    read = {path: parse_design(text, path) for path, text in designs.items()}
     wrong = [
         Message(f"is a design for {found.plant.name}", expected=f"one for {name}", file=str(path))
         for path, found in read.items()
@@ -155,7 +144,7 @@ def _controllers(rig: Rig, designs: Iterable[Path]) -> dict[str, Controller]:
     for path, found in read.items():
         if differing := differences(found.plant, rig.plant):
             what = f"{path}: designed for other values than those of {rig.name}: "
-            warnings.warn(what + listed(differing, MOST_NAMED), stacklevel=3)
+            warnings.warn(what + listed(differing, MOST_NAMED), stacklevel=4)
     return {path.stem: found.controller for path, found in read.items()}
 
 
@@ -170,10 +159,9 @@ def differences(designed: Plant, real: Plant) -> list[str]:
     ]
 
 
-def drawn_plants(rig: Rig, runs: int) -> tuple[Plant, ...]:
-    """The plants of so many runs, the same at every call: the rig's own, then drawn ones."""
-    rng = np.random.default_rng(0)
-    return (rig.plant, *(drawn(rig, rng) for _ in range(runs - 1)))
+def drawn_plant(rig: Rig, number: int) -> Plant:
+    """The plant of one run, counted from 0: the rig's own, then drawn ones, each by its number."""
+    return drawn(rig, np.random.default_rng((0, number))) if number else rig.plant
 
 
 def drawn(rig: Rig, rng: np.random.Generator) -> Plant:
@@ -190,7 +178,7 @@ def drawn(rig: Rig, rng: np.random.Generator) -> Plant:
     return plant.with_values(values)
 
 
-def styled_figures(found: Check | ShiftCheck | FollowingCheck) -> dict[str, Figure]:
+def styled_figures(found: Checked) -> dict[str, Figure]:
     """The figures of a check in the common style."""
     with styled():
         if isinstance(found, FollowingCheck):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -56,8 +57,9 @@ def sensors(plant: Plant) -> Hardware:
     return Hardware(noise=noise, resolution=dict.fromkeys(positions, POSITION_GRID_M))
 
 
+@lru_cache(maxsize=8)
 def standard_estimator(name: str, plant: Plant, sample_time_s: float) -> Estimator:
-    """An estimator of the registry for the sensors and the usual process noise.
+    """An estimator of the registry for the sensors and the usual process noise, made once.
 
     Raises
     ------

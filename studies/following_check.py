@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -112,8 +113,9 @@ def tasks_of(plant: Plant) -> dict[str, Task]:
     return {task.name: task for task in BENCHES[plant.name].tasks(plant)}
 
 
+@lru_cache(maxsize=8)
 def observer_of(name: str, plant: Plant, sample_time_s: float) -> Estimator:
-    """An estimator of the registry for the sensors of the plant's bench; `raw` is none.
+    """An estimator of the registry for the sensors of the plant's bench, made once; `raw` is none.
 
     Raises
     ------

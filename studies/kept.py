@@ -31,10 +31,12 @@ class Kept:
         """Keep a row; it is on disk when this returns."""
         kept = {"key": key, **row}
         self.path.parent.mkdir(parents=True, exist_ok=True)
-        before = self.path.read_bytes() if self.path.exists() else b""
-        cut = bool(before) and not before.endswith(b"\n")
-        with self.path.open("a", encoding="utf-8") as file:
-            file.write(("\n" if cut else "") + json.dumps(kept) + "\n")
+        with self.path.open("ab+") as file:
+            cut = False
+            if file.tell():
+                file.seek(-1, os.SEEK_END)
+                cut = file.read() != b"\n"
+            file.write(("\n" if cut else "").encode() + json.dumps(kept).encode() + b"\n")
             file.flush()
             os.fsync(file.fileno())
         self.rows[key] = kept

@@ -74,10 +74,13 @@ class Robustness:
     ----------
     deviations
         By parameter, shape (n,), in its standard deviations.
+    each
+        What one of them is called.
     """
 
     lines: tuple[Line, ...]
     deviations: Mapping[str, np.ndarray]
+    each: str = "draw"
 
     def influences(self, line: Line) -> tuple[tuple[str, float], ...]:
         """(parameter, rank correlation) of those that clearly matter, the strongest first."""
@@ -100,9 +103,14 @@ class Robustness:
         """A row per line, and the parameters of the worst draws."""
         head = ("line", "asked", "median", "95 %", "worst", "missed by", "probability", "moved by")
         rows = [self._row(line) for line in self.lines]
-        worst = dict.fromkeys(int(k) for line in self.lines for k in line.worst[:1])
-        told = [self.told(draw) for draw in [*worst][:WORST_SHOWN]]
+        told = [self.told(draw) for draw in self.worst[:WORST_SHOWN]]
         return "\n".join([columns(head, rows), *told])
+
+    @property
+    def worst(self) -> tuple[int, ...]:
+        """The worst draw of each line, that of the line most often missed first."""
+        lines = sorted(self.lines, key=lambda line: -line.probability)
+        return tuple(dict.fromkeys(int(line.worst[0]) for line in lines))
 
     def _row(self, line: Line) -> Sequence[str]:
         low, high = line.interval
@@ -116,6 +124,8 @@ class Robustness:
     def told(self, draw: int) -> str:
         """The parameters of one draw that were farthest off."""
         off = {name: float(each[draw]) for name, each in self.deviations.items()}
+        if not any(off.values()):
+            return f"{self.each} {draw + 1}: the rig's own values"
         farthest = sorted(off, key=lambda name: -abs(off[name]))[: MOST_NAMED + 2]
         words = (f"{public_name(name)} {off[name]:+.1f} sd" for name in farthest)
-        return f"draw {draw + 1}: " + ", ".join(words)
+        return f"{self.each} {draw + 1}: " + ", ".join(words)

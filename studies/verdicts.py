@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import nan
 
 import numpy as np
 
-from studies.closed_loop_check import Check
+from studies.checking import drawn_plant
 from studies.documents import Document, plain
-from studies.following_check import FollowingCheck
-from studies.shift_check import ShiftCheck
 from studies.specification import Asked, Specification
 from studies.text import columns, shown
 from workbench.plant import Plant
@@ -46,11 +45,11 @@ class Verdict:
 
 @dataclass(frozen=True)
 class Judged:
-    """All verdicts of a check, and the plants of its runs: the rig's own, then the drawn ones."""
+    """All verdicts of a check over so many runs: of the rig's own plant, then of drawn ones."""
 
     rig: Rig
     verdicts: tuple[Verdict, ...]
-    plants: tuple[Plant, ...]
+    runs: int
 
     @property
     def met(self) -> bool:
@@ -66,7 +65,7 @@ class Judged:
     @property
     def text(self) -> str:
         """One row per line and scenario; with several runs, of the worst, and what it drew."""
-        several = len(self.plants) > 1
+        several = self.runs > 1
         end = ("worst", "met by", "worst run") if several else ("found", "met")
         with_estimator = len({each.estimator for each in self.verdicts}) > 1
         head = ("line", "scenario", *(("estimator",) if with_estimator else ()), "asked", *end)
@@ -86,7 +85,7 @@ class Judged:
         """What sets a run apart, in standard deviations, farthest first."""
         if not run:
             return "run 1: the rig's own values"
-        drawn = drawn_values(self.rig, self.plants[run])
+        drawn = drawn_values(self.rig, drawn_plant(self.rig, run))
         farthest = sorted(drawn.items(), key=lambda item: -abs(item[1][1]))[:MOST_NAMED]
         words = (f"{public_name(n)} {shown(v, n)} ({z:+.1f} sd)" for n, (v, z) in farthest)
         return f"run {run + 1}: " + ", ".join(words)
@@ -100,7 +99,7 @@ class Judged:
         }
 
     def _entry(self, each: Verdict) -> Document:
-        drawn = drawn_values(self.rig, self.plants[each.worst])
+        drawn = drawn_values(self.rig, drawn_plant(self.rig, each.worst))
         parameters = {
             public_name(name): {"value": value, "unit": si_unit(name), "deviations": deviations}
             for name, (value, deviations) in drawn.items()
@@ -120,30 +119,30 @@ class Judged:
         }
 
 
-def judge(
-    spec: Specification,
-    rig: Rig,
-    found: Check | ShiftCheck | FollowingCheck,
-    plants: Sequence[Plant],
-) -> Judged:
+@dataclass(frozen=True)
+class Figures:
+    """What a specification asks of one loop of a run: the figure by line, none of a lost loop."""
+
+    scenario: str
+    estimator: str
+    found: Mapping[str, float]
+
+
+def judge(spec: Specification, rig: Rig, runs: Sequence[Sequence[Figures]]) -> Judged:
     """Every line in every scenario that it is judged in, over the runs of a check of one design.
 
     Parameters
     ----------
-    plants
-        Of the runs; each has the same scenarios and estimators, in the same order.
+    runs
+        The loops of each run; each has the same scenarios and estimators, in the same order.
     """
-    each_run = len(found.rows) // len(plants)
     verdicts = []
     for asked in spec.asked:
-        for place in range(each_run):
-            runs = [*zip(found.rows[place::each_run], found.records[place::each_run], strict=True)]
-            first = runs[0][0]
+        for place, first in enumerate(runs[0]):
             if first.scenario in asked.scenarios:
-                values = tuple(asked.found(row, record) for row, record in runs)
-                estimator = getattr(first, "estimator", "")
-                verdicts.append(Verdict(asked, first.scenario, estimator, values))
-    return Judged(rig, tuple(verdicts), tuple(plants))
+                values = tuple(run[place].found.get(asked.name, nan) for run in runs)
+                verdicts.append(Verdict(asked, first.scenario, first.estimator, values))
+    return Judged(rig, tuple(verdicts), len(runs))
 
 
 def drawn_values(rig: Rig, plant: Plant) -> dict[str, tuple[float, float]]:

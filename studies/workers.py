@@ -18,6 +18,7 @@ from workbench.errors import InputError, Message
 
 Piece = TypeVar("Piece")
 ANSWERS_WITHIN = "5s"
+WORKERS_WITHIN_S = 60  # of a cluster that has just been started
 
 
 @dataclass(frozen=True)
@@ -104,5 +105,6 @@ def _on_cluster(address: str) -> Iterator[None]:
     except (OSError, ValueError) as error:
         what = f"no Dask scheduler answers at {address}"
         raise InputError(Message(what, "--scheduler", "tcp://host:port of one")) from error
-    with client, parallel_config(backend="dask", client=client):
+    patient = {"wait_for_workers_timeout": WORKERS_WITHIN_S}
+    with client, parallel_config(backend="dask", client=client, **patient):
         yield

@@ -76,3 +76,13 @@ def standing_at(plant, position_m):
         for part in plant.parts
     )
     return replace(plant, parts=tuple(parts))
+
+
+@pytest.fixture(scope="session")
+def lq(tmp_path_factory):
+    """A design file for the servo drive."""
+    from controllers.design_file import design, write_design
+
+    path = tmp_path_factory.mktemp("design") / "lq.toml"
+    write_design(design("lq", PLANT_MODELS["servo_drive"]), path)
+    return path

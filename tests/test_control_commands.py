@@ -9,9 +9,10 @@ from commands import call
 from slide_controllers import SLIDE_CONTROLLERS
 
 from controllers.condensed import MpcSpec, limits_of
+from controllers.design_file import read_design
 from linearize.axes import stroke_m
 from linearize.standard import SLIDE_MODES
-from studies.checking import differences
+from studies.checking import Loops, differences
 from studies.closed_loop_check import Check
 from studies.closed_loop_metrics import LOST_SHARE, Metrics, rise_s, table, valve_switches
 from studies.documents import check_document
@@ -101,9 +102,9 @@ def test_a_plant_that_nothing_can_drive_is_refused_in_one_line(place, tmp_path):
 def test_a_design_for_another_plant_is_refused(place, monkeypatch):
     from studies import checking
 
-    found = checking.read_design(place / "new" / "folder" / "pid.toml")
+    found = read_design(place / "new" / "folder" / "pid.toml")
     other = replace(found, plant=replace(found.plant, name="crr_rig"))
-    monkeypatch.setattr(checking, "read_design", lambda path: other)
+    monkeypatch.setattr(checking, "parse_design", lambda text, path: other)
 
     answer = call("check", place / "servo_drive.toml", place / "new" / "folder" / "pid.toml")
 
@@ -156,13 +157,16 @@ def test_a_diverged_run_has_not_reached_anything():
     assert replace(FOLLOWED, rmse_m=NONE).reached is False
 
 
-@pytest.mark.parametrize(("rows", "code"), [((GOOD, FOLLOWED), 0), ((GOOD, FAR), 1), ((LOST,), 1)])
+@pytest.mark.parametrize(
+    ("rows", "code"), [((GOOD, FOLLOWED), 0), ((FAR, FOLLOWED), 1), ((GOOD, LOST), 1)]
+)
 def test_the_exit_code_depends_on_rows_with_a_goal(place, monkeypatch, rows, code):
-    from studies import checking
+    by_name = {each.scenario: Check((each,), (RECORD,)) for each in rows}
+    monkeypatch.setattr(Loops, "once", lambda loops, *_: by_name[loops.scenarios[0]])
 
-    monkeypatch.setattr(checking, "check_rig", lambda *_: Check(rows, ()))
+    answer = call("check", place / "servo_drive.toml", place / "new" / "folder" / "pid.toml")
 
-    assert call("check", place / "servo_drive.toml", "pid.toml").exit_code == code
+    assert answer.exit_code == code, answer.output
 
 
 def test_other_values_than_those_of_the_design_are_named_five_of_them():
@@ -177,8 +181,6 @@ def test_other_values_than_those_of_the_design_are_named_five_of_them():
 
 
 def test_a_check_warns_once_of_a_design_for_other_values(place, monkeypatch, tmp_path):
-    from studies import checking
-
     values = [
         '"slide.mass" = "2.3 kg"', '"supply.pressure" = "6.5 bar"',
         '"friction.viscous" = "50 N s/m"', '"chamber_a.dead_volume" = "40 cm^3"',
@@ -186,7 +188,7 @@ def test_a_check_warns_once_of_a_design_for_other_values(place, monkeypatch, tmp
     ]  # fmt: skip
     rig = tmp_path / "rig.toml"
     rig.write_text('plant = "servo_drive"\n[values]\n' + "\n".join(values) + "\n")
-    monkeypatch.setattr(checking, "check", lambda *_, **__: Check((GOOD,), (RECORD,)))
+    monkeypatch.setattr(Loops, "once", lambda *_: Check((GOOD,), (RECORD,)))
 
     answer = call("check", rig, place / "new" / "folder" / "pid.toml", "-q")
 

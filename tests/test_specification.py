@@ -11,10 +11,9 @@ from hypothesis import strategies as st
 
 from controllers.condensed import MpcSpec
 from linearize.axes import stroke_m
-from studies.checking import drawn_plants
-from studies.closed_loop_check import Check
+from studies.checking import drawn_plant
 from studies.scenarios import SCENARIOS
-from studies.shift_check import SHIFTS, ShiftCheck
+from studies.shift_check import SHIFTS
 from studies.specification import (
     SHIFT_LINES,
     SLIDE_LINES,
@@ -22,7 +21,7 @@ from studies.specification import (
     design_numbers,
     read_specification,
 )
-from studies.verdicts import drawn_values, judge
+from studies.verdicts import Figures, drawn_values, judge
 from workbench.errors import InputError
 from workbench.recording import Recording
 from workbench.rig import default_rig, load_rig
@@ -45,9 +44,13 @@ def answered(text, *rows, rig=DRIVE, records=None):
     """What a specification says of rows, one for each run, the first that of the rig itself."""
     spec = read_specification(text + "\n", rig)
     records = records or [record(slide__position_m=[0.1])] * len(rows)
-    kind = ShiftCheck if rig is GEARBOX else Check
-    plants = drawn_plants(rig, len(rows))
-    return judge(spec, rig, kind(rows, tuple(records)), plants)
+    return judge(spec, rig, [[figures(spec, *run)] for run in zip(rows, records, strict=True)])
+
+
+def figures(spec, row, record):
+    """What each line that is judged in the scenario finds in a run."""
+    lines = (line for line in spec.asked if row.scenario in line.scenarios)
+    return Figures(row.scenario, row.estimator, {n.name: n.found(row, record) for n in lines})
 
 
 def row(scenario="step", **figures):
@@ -261,7 +264,7 @@ def test_over_several_plants_a_line_has_its_share_and_its_worst_with_what_it_dre
     assert (entry["share_met"], entry["worst_run"], entry["met"]) == (0.5, 3, False)
     assert entry["found_by_run"] == [0.12, 0.16, 0.19, 0.10]
     assert entry["asked"] == {"from": None, "to": 0.15}
-    third = drawn_plants(DRIVE, 4)[2]
+    third = drawn_plant(DRIVE, 2)
     drawn = entry["worst_parameters"]
     assert drawn["slide.mass"]["value"] == third.values["slide.mass_kg"]
     assert third.values["slide.mass_kg"] == pytest.approx(

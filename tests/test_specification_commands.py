@@ -60,7 +60,7 @@ def test_design_answers_with_the_verdicts_of_check_on_the_same_rig(place):
 def test_check_answers_yes_where_all_lines_are_met_and_tells_the_share_of_plants(place):
     answer = call(
         "check", place / "servo_drive.toml", place / "lq.toml", "--spec", place / "readme.toml",
-        "--scenario", "step", "--runs", 2, "-q",
+        "--scenario", "step", "--runs", 2, "--workers", 1, "-q",
     )  # fmt: skip
 
     assert answer.exit_code == 0, answer.output
@@ -120,9 +120,9 @@ def test_a_shift_that_takes_too_long_is_a_no_in_the_document_too():
 def test_check_refuses_a_specification_before_it_runs_anything(
     place, tmp_path, monkeypatch, rig, text, expected
 ):
-    from studies import checking
+    from studies import checked_runs
 
-    monkeypatch.setattr(checking, "check_rig", None)
+    monkeypatch.setattr(checked_runs, "rows_of", None)
     spec = tmp_path / "spec.toml"
     spec.write_text(text + "\n")
 

@@ -7,6 +7,7 @@ from typing import Any
 
 from studies.command_line import (
     catalogue,
+    closed_loop,
     control,
     estimation,
     identify,
@@ -50,6 +51,7 @@ app.registered_commands.sort(key=_place)
 __all__ = [
     "app",
     "catalogue",
+    "closed_loop",
     "control",
     "estimation",
     "identify",

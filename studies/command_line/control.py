@@ -1,14 +1,12 @@
-"""Commands on modes and closed loops: modes, design, check."""
+"""Commands on modes and controllers: modes, design."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from studies.command_line.application import (
-    NO,
-    Figures,
     Json,
     Output,
     Quiet,
@@ -19,23 +17,11 @@ from studies.command_line.application import (
     command_text,
     example,
 )
+from studies.command_line.closed_loop import Spec, tell_missed
 from studies.command_line.files import read_all, writable, write_json
 
 if TYPE_CHECKING:
     from controllers.design_file import Design
-    from studies.closed_loop_check import Check
-    from studies.following_check import FollowingCheck
-    from studies.shift_check import ShiftCheck
-    from studies.specification import Specification
-    from studies.verdicts import Judged
-    from workbench.rig import Rig
-
-DesignFile = Annotated[Path, typer.Argument(metavar="DESIGN", help="What `design` wrote.")]
-Several = Annotated[int, typer.Option("--runs", metavar="N", min=1, help="Plants to draw.")]
-Spec = Annotated[
-    Path | None, typer.Option("--spec", metavar="SPEC.toml", help="What the loop is asked for.")
-]
-CHECK = "workbench check rig.toml lq.toml --estimator mhe --scenario step --spec spec.toml"
 
 
 @app.command(cls=Spread, epilog=example("workbench modes rig.toml --export modes"))
@@ -138,34 +124,11 @@ def design(
             _certify(found, say)
         typer.echo(f"wrote {output}")
         if asked and asked.asked:
-            from studies.verdicts import judge
+            from studies.checked_runs import check_rig
 
-            checked = _closed_loop(known, output, (), (), 1, say)
-            judged = judge(asked, known, checked, (known.plant,))
+            judged = check_rig(known, output, spec=asked, say=say).judged
             typer.echo("\n" + judged.text)
-            _tell_missed(judged)
-
-
-def _closed_loop(
-    rig: "Rig",
-    design: Path,
-    estimators: Iterable[str],
-    scenarios: Iterable[str],
-    runs: int,
-    say: Callable[[str], None],
-) -> "Check | ShiftCheck | FollowingCheck":
-    """A design in the scenarios of its plant; a gearbox brings its own estimator."""
-    from studies.checking import check_follower, check_gears, check_rig, follows, shifts_gears
-    from workbench.errors import InputError, Message
-
-    if follows(rig):
-        return check_follower(rig, [design], estimators or ["ekf"], scenarios, runs, say)
-    if not shifts_gears(rig):
-        return check_rig(rig, [design], estimators or ["ekf"], scenarios, runs, say)
-    if estimators:
-        what = f"{rig.name} has an estimator of its own: leave --estimator out"
-        raise InputError(Message(what))
-    return check_gears(rig, [design], scenarios, runs, say)
+            tell_missed(judged)
 
 
 def _certify(found: "Design", say: Callable[[str], None]) -> None:
@@ -184,89 +147,3 @@ def _certify(found: "Design", say: Callable[[str], None]) -> None:
         typer.echo(margins_text(margins(*loop), delay_s))
         say("looking for a certificate across modes")
         typer.echo(certificate_text(certificate(loops(*loop), made.sample_time_s)))
-
-
-@app.command(cls=Spread, epilog=example(CHECK))
-def check(
-    rig: RigFile,
-    design: DesignFile,
-    estimator: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--estimator", metavar="NAME", help="ekf (usual), ukf, imm, mhe; not for shifts."
-        ),
-    ] = None,
-    scenario: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--scenario", metavar="NAME", help="step, sine; n-h, h-n, ...; as named; all."
-        ),
-    ] = None,
-    runs: Several = 1,
-    spec: Spec = None,
-    figures: Figures = None,
-    json: Json = None,
-    quiet: Quiet = False,
-) -> None:
-    """Closed loop against the full nonlinear plant; exit code 1 where the goal is missed.
-
-    The goal is the specification, where one is given: a verdict per line, and with --runs the
-    share of plants that meet it and the worst one.
-
-    A gearbox is judged by its four shifts, each beside the open loop on the same plant.
-
-    With --runs N > 1 the plant's parameters are drawn from their uncertainty, and the estimator
-    keeps the rig's own values.
-    """
-    with answering(quiet) as say:
-        from studies.documents import check_document
-        from workbench.rig import load_rig
-
-        writable(json, folders=[figures])
-        known = load_rig(rig)
-        asked = _asked(spec, known, scenario or ()) if spec else None
-        found = _closed_loop(known, design, estimator or (), scenario or (), runs, say)
-        judged = _judged(asked, known, found, runs) if asked else None
-        document = check_document(known.name, found) | (judged.document if judged else {})
-        write_json(json, document)
-        if figures:
-            from studies.checking import styled_figures
-            from studies.figures.style import save_all
-
-            save_all(styled_figures(found), figures, command_text())
-            say(f"figures in {figures}")
-        typer.echo(found.text)
-        if judged:
-            typer.echo("\n" + judged.text)
-            _tell_missed(judged)
-            if not judged.met:
-                raise typer.Exit(NO)
-        elif any(row.reached is False for row in found.rows):
-            typer.echo(found.goal, err=True)
-            raise typer.Exit(NO)
-
-
-def _asked(spec: Path, rig: "Rig", scenarios: Iterable[str]) -> "Specification":
-    """What a specification asks for in these scenarios; one without a line asks for nothing."""
-    from studies.specification import read_specification
-    from workbench.errors import InputError, Message
-
-    found = read_specification(spec, rig, scenarios)
-    if not found.asked:
-        expected = 'a line such as rise_time = "150 ms"'
-        raise InputError(Message("asks for nothing", expected=expected, file=str(spec)))
-    return found
-
-
-def _tell_missed(judged: "Judged") -> None:
-    if not judged.met:
-        typer.echo(f"out of specification: {', '.join(judged.missed)}", err=True)
-
-
-def _judged(
-    asked: "Specification", rig: "Rig", found: "Check | ShiftCheck | FollowingCheck", runs: int
-) -> "Judged":
-    from studies.checking import drawn_plants
-    from studies.verdicts import judge
-
-    return judge(asked, rig, found, drawn_plants(rig, runs))

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 COLUMNS = 3
 ROW_IN = 1.8
 MOST_PARAMETERS = 12  # in the map, the strongest
+LONG = 20  # letters of a line that does not fit below its column
 DARK = 0.6  # from there on the map is too dark for black letters
 
 
@@ -36,7 +37,7 @@ def spread_figure(found: Robustness, limits: Mapping[str, float]) -> Figure:
         for axes in panels[len(found.lines) :]:
             axes.set_visible(False)
         for axes in panels[::COLUMNS]:
-            axes.set_ylabel("draws (%)")
+            axes.set_ylabel(f"{found.each}s (%)")
     return figure
 
 
@@ -72,13 +73,14 @@ def _draw_spread(axes: Axes, line: Line, limit: float | None) -> None:
     if limit is not None:
         axes.axvline(limit, color=BLACK, linestyle="--", linewidth=0.8)
     axes.set_ylim(0.0, 100.0)
-    axes.set_xlabel(line.name)
+    axes.set_xlabel(f"{line.name} ({line.unit})" if line.unit else line.name)
 
 
 def _draw_map(axes: Axes, values: np.ndarray, rows: list[str], over: list[str]) -> None:
     image = axes.imshow(values, cmap="RdBu", vmin=-1.0, vmax=1.0, aspect="auto")
     axes.set_yticks(range(len(rows)), rows)
-    axes.set_xticks(range(len(over)), over)
+    slanted = {"rotation": 25, "ha": "right"} if max(map(len, over)) > LONG else {}
+    axes.set_xticks(range(len(over)), over, **slanted)
     axes.grid(visible=False)
     for (row, column), r in np.ndenumerate(values):
         if np.isfinite(r):

@@ -1,0 +1,76 @@
+"""What a check over many drawn plants tells: lines, worst runs, influences, figures."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from check_loops import MASS, RIG, SPEC, heavy_is_slow, metrics, record
+
+from studies.checked_runs import FEW, check_rig
+from studies.checking import Loops, drawn_plant
+from studies.closed_loop_check import Check
+from studies.specification import read_specification
+from workbench.recording import Recording
+
+
+def test_many_runs_say_how_often_a_line_is_missed_where_and_by_what(lq, monkeypatch):
+    monkeypatch.setattr(Loops, "once", heavy_is_slow)
+    asked = read_specification(SPEC, RIG)
+    found = check_rig(RIG, lq, ["ekf"], ["step"], spec=asked, runs=50)
+    rise, air, pressure = found.document["robustness"]
+    masses = [drawn_plant(RIG, k).values[MASS] for k in range(50)]
+
+    assert rise["probability"] == np.mean(0.145 + 0.2 * (np.array(masses) / 2.22 - 1.0) > 0.15)
+    assert rise["interval"][0] < rise["probability"] < rise["interval"][1]
+    assert rise["influences"]["slide.mass"] == pytest.approx(1.0)
+    assert rise["worst_run"] == 1 + int(np.argmax(masses))
+    assert air["probability"] == pressure["probability"] == 0.0
+    assert {"line", "scenario", "asked", "found_by_run"} <= set(found.document["specification"][0])
+    assert len(found.document["runs"]) == 50
+    assert f"\nrun {rise['worst_run']}: " in found.text
+    assert "slide.mass +1.00" in found.text and "limits.chamber_a.pressure, step, bey" in found.text
+    assert len(found.text.splitlines()) < 10
+
+
+def test_without_a_specification_many_runs_tell_how_often_the_goal_is_missed(lq, monkeypatch):
+    def heavy_misses(loops, plant, seed):
+        late = plant.values[MASS] > RIG.plant.values[MASS]
+        return Check((metrics(final_error_m=1e-3 if late else 1e-5),), (record(),))
+
+    monkeypatch.setattr(Loops, "once", heavy_misses)
+    found = check_rig(RIG, lq, ["ekf"], ["step"], runs=40)
+    (entry,) = found.document["robustness"]
+    heavy = sum(drawn_plant(RIG, k).values[MASS] > RIG.plant.values[MASS] for k in range(40))
+
+    assert (entry["line"], entry["probability"]) == ("goal", heavy / 40)
+    assert next(iter(entry["influences"])) == "slide.mass"
+    assert f"{heavy} of 40" in found.text and not found.met
+
+
+def test_few_runs_are_told_one_by_one(lq, monkeypatch):
+    monkeypatch.setattr(Loops, "once", heavy_is_slow)
+    told = check_rig(RIG, lq, ["ekf"], ["step"], runs=FEW).text.splitlines()
+
+    assert [line.split()[:2] for line in told[1:]] == [["lq", str(k + 1)] for k in range(FEW)]
+
+
+def test_figures_close_the_first_and_the_worst_loops_again_and_no_others(lq, monkeypatch):
+    again = []
+
+    def noted(loops, plant, seed):
+        again.append(seed)
+        n = 3000
+        names = ("slide.position_m", "reference.slide.position_m", "valve.command_v")
+        channels = dict.fromkeys(names, np.linspace(0.1, 0.2, n))
+        return Check(
+            heavy_is_slow(loops, plant, seed).rows,
+            (SimpleNamespace(recording=Recording("run", 1e-3, channels)),),
+        )
+
+    monkeypatch.setattr(Loops, "once", heavy_is_slow)
+    asked = read_specification('rise_time = "150 ms"\n', RIG)
+    found = check_rig(RIG, lq, ["ekf"], ["step"], spec=asked, runs=FEW + 8)
+    monkeypatch.setattr(Loops, "once", noted)
+
+    assert set(found.figures()) == {"closed_loop_step", "influences", "spread"}
+    assert again == [0, found.document["robustness"][0]["worst_run"] - 1]
