@@ -11,6 +11,7 @@ from scipy.linalg import solve_discrete_are
 
 from controllers.margins import Law
 from controllers.positioning import STATES, PositioningSpec
+from controllers.program_solvers import Answer, Daqp, Solver
 from controllers.spec import ranged
 from linearize.axes import stroke_m
 from linearize.discrete import sampled
@@ -21,9 +22,6 @@ from workbench.plant import Plant
 SLACK_UNIT = np.array([1e-3, 0.1, 1e4, 1e4])  # m, m/s, Pa, Pa: violations that cost alike
 SLACKS = len(STATES) + 1  # one per state, and one for the rate of the opening, in V per sample
 LONGEST = 500  # samples ahead; the program is dense, and grows with the square
-OPTIMAL = 1  # DAQP's flag
-FAR = 1e30  # as good as no bound
-FEASIBLE = 1e-5  # V, or units of the slack
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,6 +76,7 @@ class Program:
                         shape (2, 4 N)
     openings            smallest and largest opening
     move_v              largest change of the opening from sample to sample, soft
+    solver              what solves it at its limits
     """
 
     H: np.ndarray
@@ -92,6 +91,7 @@ class Program:
     state_limits: np.ndarray
     openings: tuple[float, float]
     move_v: float
+    solver: Solver = Daqp()
 
     @property
     def horizon(self) -> int:
@@ -145,47 +145,25 @@ class Program:
 
     def solved(
         self, g: np.ndarray, low: np.ndarray, high: np.ndarray, start: np.ndarray | None
-    ) -> tuple[np.ndarray, int] | None:
-        """The optimum z and DAQP's iterations, from a start where there is one; None without one.
-
-        Its word is checked: z is finite and keeps the sides of all rows.
-        """
-        import daqp
-
-        if not np.isfinite(g).all():
-            return None
-        first, rest = self._order
-        lower, upper = (np.nan_to_num(side, posinf=FAR, neginf=-FAR) for side in (low, high))
-        z, _, flag, info = daqp.solve(
-            self.H,
-            g,
-            self._general,
-            np.concatenate([upper[first], upper[rest]]),
-            np.concatenate([lower[first], lower[rest]]),
-            np.zeros(len(low), dtype=np.int32),
-            primal_start=start,
-        )
-        if flag != OPTIMAL or not np.isfinite(z).all():
-            return None
-        at = self.rows @ z
-        kept = (at >= low - FEASIBLE).all() and (at <= high + FEASIBLE).all()
-        return (z, int(info["iterations"])) if kept else None
+    ) -> Answer:
+        """The optimum z and the solver's iterations, from a start where there is one."""
+        return self.solver.solved(self, g, low, high, start)
 
     @cached_property
-    def _order(self) -> tuple[np.ndarray, np.ndarray]:
+    def order(self) -> tuple[np.ndarray, np.ndarray]:
         """Rows that bound one variable each, in the order of z, and all others."""
         every = np.arange(len(self.rows))
         bounds = np.concatenate([every[: self.horizon], every[-SLACKS:]])
         return bounds, every[self.horizon : -SLACKS]
 
     @cached_property
-    def _general(self) -> np.ndarray:
+    def general(self) -> np.ndarray:
         """The rows that are no bounds of a variable, as DAQP reads them."""
-        return np.ascontiguousarray(self.rows[self._order[1]])
+        return np.ascontiguousarray(self.rows[self.order[1]])
 
     def prepared(self) -> Program:
         """The same program with its factors at hand, so that the first sample need not wait."""
-        _ = self._order, self._general, self.inverse
+        _ = self.order, self.general, self.inverse
         return self
 
 

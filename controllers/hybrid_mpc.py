@@ -21,9 +21,9 @@ Source: paper 003 Sec. V for the modes.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 
@@ -38,7 +38,7 @@ from controllers.switching_plans import Plans, plans, switching_times
 from linearize.modes import HybridModel
 from linearize.shifting import STATES
 from linearize.valve_response import MASK, ValveResponse, age, packed, valve_response
-from workbench.called import called
+from workbench.called import prepared
 from workbench.contracts import Command, Estimate
 from workbench.errors import InputError, Message
 
@@ -162,7 +162,8 @@ class HybridMpc:
         ranked = self._ranked(x, query, sent, before)[: self.spec.judged + 1 - len(near)]
         asked = np.concatenate([near, ranked])
         shares = self._shares(sent, asked.transpose(1, 0, 2))
-        costs = called(self.prediction.judged, x, np.reshape(shares, (2, -1)), query)[0].ravel()
+        every = np.reshape(shares, (2, -1)).T.ravel()
+        (costs,) = self._calls[2](x, every, query)
         standing = np.broadcast_to([[s & 1] for s in sent], (len(asked), 2, 1))
         switches = np.abs(np.diff(asked, axis=2, prepend=standing)).sum(axis=(1, 2))
         costs = costs + self._price * switches
@@ -177,12 +178,13 @@ class HybridMpc:
         """The best pairs of plans under the modes along the last plan, shape (judged, 2, N)."""
         N, both = self.spec.horizon, [self.plans(s) for s in sent]
         along = np.array(self._shares(sent, before))
-        way, slope = called(self.prediction.linearised, x, along)
+        way, columns = self._calls[0](x, along.T.ravel())
+        by_share = columns.reshape(2 * N, 2 * N)  # a row for each share, as CasADi stores columns
         moved = [
-            slope[:, N * v : N * (v + 1)] @ (response.ahead(s, p.packed) - along[v]).T
+            ((response.ahead(s, p.packed) - along[v]) @ by_share[N * v : N * (v + 1)]).ravel()
             for v, (response, s, p) in enumerate(zip(self.responses, sent, both, strict=True))
         ]
-        costs = called(self.prediction.ranked, way, *moved, query, x)[0].ravel()
+        (costs,) = self._calls[1](way, *moved, query, x)
         costs += self._price * np.add.outer(*(p.switches for p in both)).ravel()
         costs[~np.isfinite(costs)] = np.inf
         chosen = np.argpartition(costs, self.spec.judged)[: self.spec.judged]
@@ -206,6 +208,16 @@ class HybridMpc:
         """Shares of each valve under commands of shape (2, ..., N)."""
         pairs = zip(self.responses, sent, commands, strict=True)
         return [response.ahead(s, packed(ahead)) for response, s, ahead in pairs]
+
+    @cached_property
+    def _calls(self) -> tuple[Callable[..., list[np.ndarray]], ...]:
+        """The functions of the prediction, ready to be called at every sample."""
+        found = self.prediction
+        return tuple(prepared(f) for f in (found.linearised, found.ranked, found.judged))
+
+    def __getstate__(self) -> dict[str, object]:
+        """Without what another process makes anew."""
+        return {key: value for key, value in self.__dict__.items() if key != "_calls"}
 
     def plans(self, sent: int) -> Plans:
         """What one valve may do after these commands."""

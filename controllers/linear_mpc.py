@@ -1,4 +1,4 @@
-"""Linear MPC: one condensed quadratic program per mode, solved by DAQP from the last plan.
+"""Linear MPC: one condensed quadratic program per mode, solved from the last plan.
 
     min   sum_i |x_i - target_i|_Q^2 + |u_i - u_s|_R^2 + |u_i - u_i-1|_S^2 + |x_N - target_N|_P^2
           + rho |slack|^2
@@ -15,9 +15,8 @@ The mode is that of the place to which the last plan leads in half a horizon.  W
 finite, the solver has no answer, or its answer comes after the deadline, the last plan goes on, and
 the notes say so.
 
-Where the unconstrained optimum keeps all limits it is the solution, and DAQP is not asked.  DAQP is
-exact and three times faster here than OSQP with polish; ``tests/benchmarks/test_speed_of_mpc.py``
-prints both.
+Where the unconstrained optimum keeps all limits it is the solution, and no solver is asked.  At the
+limits it is DAQP unless another one is given, see :mod:`controllers.program_solvers`.
 """
 
 from __future__ import annotations
@@ -33,6 +32,7 @@ from controllers.condensed import SLACKS, MpcSpec, Program, limits_of, program_o
 from controllers.margins import Law
 from controllers.motion import PREVIEW
 from controllers.positioning import STATES, Memory, Positioning, Task, positioning
+from controllers.program_solvers import Daqp, Solver
 from controllers.scheduled import Schedule, scheduled
 from linearize.modes import HybridModel
 from linearize.reduction import closed_command
@@ -183,14 +183,19 @@ def steady_plan(horizon: int, steady_v: float, place_m: float = nan) -> Plan:
     return Plan(held, np.append(held, NONE), place_m)
 
 
-def linear_mpc(hybrid: HybridModel, spec: MpcSpec | None = None) -> LinearMpc:
-    """One program on every mode in which the valve drives the motion."""
+def linear_mpc(
+    hybrid: HybridModel, spec: MpcSpec | None = None, solver: Solver | None = None
+) -> LinearMpc:
+    """One program on every mode in which the valve drives the motion; DAQP is the usual solver."""
     spec = spec or MpcSpec()
     task = positioning(hybrid, spec.positioning)
     centre_v = closed_command(hybrid.plant)
     limits = limits_of(hybrid.plant, spec)
     sizes = centre_v, task.area_m2, limits, task.valve.openings_v
-    programs = scheduled(hybrid, lambda mode: program_of(mode, spec, *sizes).prepared())
+    by = solver or Daqp()
+    programs = scheduled(
+        hybrid, lambda mode: replace(program_of(mode, spec, *sizes), solver=by).prepared()
+    )
     return LinearMpc(
         task=task,
         programs=programs,

@@ -15,7 +15,9 @@ from dataclasses import dataclass
 import casadi as ca
 
 HIT = 1e-9
-LAST_BIT = 0.25  # share that goes with the root of the distance: a shift ends when it is there
+LAST_BIT, LAST_BIT_TO_STOP = 0.25, 0.6
+"""Share of the cost that goes with the root of the distance, at Neutral and at a stop: a shift ends
+when it is there.  With less a stop is braked for so early that the piston stands short of it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,4 +81,5 @@ def _distance(cost: ShiftCost, stroke_m: float, far: ca.SX, at_stop: ca.SX) -> c
     """What is left of a shift, 1 for the whole way; past a stop nothing is."""
     left = ca.if_else(at_stop, far, ca.fabs(far))
     share = ca.fmax(left - cost.within_m, 0.0) / stroke_m
-    return (1.0 - LAST_BIT) * share + LAST_BIT * ca.sqrt(share)
+    last = ca.if_else(at_stop, LAST_BIT_TO_STOP, LAST_BIT)
+    return (1.0 - last) * share + last * ca.sqrt(share)

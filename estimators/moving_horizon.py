@@ -47,7 +47,7 @@ def allowed(cost: float) -> float:
 
 def sound(P: np.ndarray) -> bool:
     """Variances that can be: finite, and below zero only by rounding."""
-    return bool((P.diagonal() >= -(ROUNDING**2)).all() and np.isfinite(P).all())
+    return all(-(ROUNDING**2) <= variance < inf for variance in P.diagonal().tolist())
 
 
 class LostError(ArithmeticError):
@@ -208,7 +208,8 @@ class MovingHorizon(StochasticPlant):
         tape, told = self.functions.sample(window.tape, news, d, p)
         step = self._accepted(tape, told[1:], told[0])
         if step is None:
-            step = self._searched(self.functions.move(window.tape, news, d, p)[0])
+            failed = not told[1] <= allowed(told[0])
+            step = self._searched(self.functions.move(window.tape, news, d, p)[0], failed)
         for _ in range(self.passes - 1):
             if perf_counter() - begun > self.deadline_s:
                 break
@@ -218,17 +219,17 @@ class MovingHorizon(StochasticPlant):
     def _accepted(self, tape: np.ndarray, told: np.ndarray, before: float) -> Step | None:
         """The full step where it lowers the cost inside the bounds; else it is to be searched."""
         X = self.functions.part(tape, "points")[:, -1]
-        if (
-            not told[0] <= before * (1.0 + ROUNDING) + ROUNDING
-        ):  # false, too, where it is not finite
+        if not told[0] <= allowed(before):  # true, too, where it is not finite
             return None
         if self.bounds and not ((self._limits[0] <= X) & (self._limits[1] >= X)).all():
             return None
         P = self._square(told[1 + len(X) :])
         return Step(Window(tape, X, P), 1.0, False) if sound(P) else None
 
-    def _searched(self, tape: np.ndarray) -> Step:
+    def _searched(self, tape: np.ndarray, full_failed: bool = False) -> Step:
         """The longest of the halved steps that lowers the cost, held inside the bounds.
+
+        A full step that is known to fail is not tried again, unless bounds shorten it.
 
         Raises
         ------
@@ -248,7 +249,8 @@ class MovingHorizon(StochasticPlant):
         if bounded:
             _, push = nearest_inside(newest, P, lower - at, upper - at)
             aim, _ = functions.solve(tape, push)
-        for k in range(HALVINGS + 1):
+        first = 1 if full_failed and not bounded and np.isfinite(before) else 0
+        for k in range(first, HALVINGS + 1):
             length = 0.5**k
             tried, after = functions.run(tape + length * (aim - tape), d, p)
             if after[0] <= allowed(before):

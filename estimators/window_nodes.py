@@ -77,7 +77,7 @@ class WindowNodes:
         kind = ca.SX if steps == 1 else ca.MX  # several are a chain of calls, or the code is long
         X, noise, moved, u, d, p, kicked = self._inputs(kind)
         real = ca.DM(self.found.scale) * kicked
-        now, w, passes, carried = real[:n_x], real[n_x:], 1.0, None
+        now, w, passes, carried = real[:n_x], real[n_x:, 0], 1.0, None
         for _ in range(steps):
             now, by_x, by_w, small = once(now, u, d, ca.vertcat(p, w))
             passes = passes * small
@@ -116,7 +116,7 @@ class WindowNodes:
         real = S * kicked
         dt, tolerances = self.found.sample_time_s, self.found.plant.model.tolerances
         step = controlled_step(*self._rates, dt, tolerances, self.coarsest_s)
-        later = ca.vertcat(step(real[:n_x], u, d, ca.vertcat(p, real[n_x:])), real[n_x:])
+        later = ca.vertcat(step(real[:n_x], u, d, ca.vertcat(p, real[n_x:, 0])), real[n_x:, 0])
         ahead = later / S + moved * ca.DM(self.kick) * noise[self.n :]
         F = moved * self.found.transition(kicked, u, d, p) + (1.0 - moved) * ca.MX.eye(self.n)
         results = [moved * ahead + (1.0 - moved) * X, ca.densify(F)]
@@ -129,7 +129,7 @@ class WindowNodes:
         X = ca.SX.sym("X", self.n)
         real = ca.SX(ca.DM(self.found.scale)) * X
         x, u, d, p = model.symbols
-        now = p + ca.SX(ca.DM(self._walking)) @ real[n_x:]
+        now = p + ca.SX(ca.DM(self._walking)) @ real[n_x:, 0]
         (y,) = ca.substitute([model.outputs], [x, p], [real[:n_x], now])
         noise = [self.found.measurement_noise[name] for name in model.measured]
         y = y / ca.DM(noise)

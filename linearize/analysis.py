@@ -1,4 +1,8 @@
-"""What a mode can do: poles, damping, controllability, observability, error against the plant."""
+"""What a mode can do: poles, damping, controllability, observability, error against the plant.
+
+Source: Kalman's rank conditions, Kailath 1980, "Linear Systems", Ch. 2; physics.md 4.2 for what
+they say of the gearbox, where position alone is not enough at rest.
+"""
 
 from __future__ import annotations
 

@@ -2,6 +2,8 @@
 
 Speeds, openings and places are *chosen*: sliding is several Stribeck velocities, so that dry
 friction is Coulomb's alone; resting is below the speed of its peak.
+
+Source: physics.md 2.1 to 2.4 (valves, strokes, ranges of the joints) and 4.3.
 """
 
 from __future__ import annotations

@@ -1,4 +1,9 @@
-"""What moves, and the cylinder that drives it: how its range is cut, and where its modes lie."""
+"""What moves, and the cylinder that drives it: how its range is cut, and where its modes lie.
+
+All values are in the units of the signals that are named: m or rad, m/s or rad/s, V.
+
+Source: physics.md 4.3.
+"""
 
 from __future__ import annotations
 
@@ -40,13 +45,6 @@ class Travel:
             Interval(self.prefix + "slide -", -inf, -rest, -self.sliding),
             Interval(self.prefix + "stick", -rest, rest, 0.0, held),
             Interval(self.prefix + "slide +", rest, inf, self.sliding),
-        )
-
-    def direction_cut(self) -> tuple[Interval, ...]:
-        """Sliding down and up, with nothing in between: where sticking does not matter."""
-        return (
-            Interval(self.prefix + "slide -", -inf, 0.0, -self.sliding),
-            Interval(self.prefix + "slide +", 0.0, inf, self.sliding),
         )
 
 

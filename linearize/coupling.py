@@ -3,6 +3,8 @@
 A contact of 2e7 N/m or a joint of 5e6 N/m makes poles that no design wants.  Without its give the
 two sides move as one, and the forces between them do no work (d'Alembert): nothing is written anew,
 the rates of the one model are added up.
+
+Source: physics.md 4.2 (masses below and above Neutral, E003-8, E003-9) and 2.3 (mass matrix).
 """
 
 from __future__ import annotations

@@ -32,7 +32,7 @@ class Interval:
     holds: tuple[str, ...] = ()
 
     def contains(self, value: float | np.ndarray) -> bool | np.ndarray:
-        """True from the lower end up to, and without, the upper one; one value or many."""
+        """True from the lower end up to, and without, the upper one; a value or any array."""
         return (self.lower <= value) & (value < self.upper)
 
 
@@ -52,7 +52,7 @@ class Level:
         return ()
 
     def contains(self, value: float | np.ndarray) -> bool | np.ndarray:
-        """True at the value; one value or many."""
+        """True at the value; a value or any array."""
         return abs(value - self.point) <= SAME_LEVEL
 
 
@@ -64,7 +64,7 @@ class Guard:
     offset: float
 
     def holds(self, signals: Mapping[str, float | np.ndarray]) -> bool | np.ndarray:
-        """True inside of it; one value of each signal or many."""
+        """True inside of it; each signal a value, or all arrays of one shape."""
         return self.offset + sum(w * signals[name] for name, w in self.weights.items()) >= 0.0
 
 

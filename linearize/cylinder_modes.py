@@ -47,16 +47,6 @@ def place_modes(plant: Plant, axis: Axis, model: DesignModel) -> HybridModel:
     return HybridModel(plant, model, (*stop_modes(plant, axis, model, valve), *free), AT_STOPS)
 
 
-def sliding_modes(plant: Plant, axis: Axis, model: DesignModel) -> HybridModel:
-    """Steady slides both ways by place, under the command that keeps each going.
-
-    What a controller of position is designed on: all are equilibria but for the motion, and the
-    command is not cut, since a controller is to choose it.
-    """
-    cuts = {axis.velocity: axis.direction_cut(), axis.position: axis.place_cut()}
-    return hybrid_modes(plant, cuts, axis.point, model)
-
-
 def stop_modes(
     plant: Plant, axis: Axis, model: DesignModel, cuts: dict[str, tuple[Region, ...]]
 ) -> list[Mode]:

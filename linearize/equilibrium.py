@@ -1,4 +1,8 @@
-"""Operating points: values that make chosen rates vanish, and how far from rest they are."""
+"""Operating points: values that make chosen rates vanish, and how far from rest they are.
+
+Source: Newton's method with ever shorter steps, Dennis and Schnabel 1983, "Numerical Methods for
+Unconstrained Optimization and Nonlinear Equations", Ch. 6.
+"""
 
 from __future__ import annotations
 

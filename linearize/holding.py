@@ -10,6 +10,8 @@ just above the interval, downwards when it points downwards everywhere just belo
 with s between the interval and the next point of a mode, and f_s without what is viscous.  Of a
 slide with Stribeck friction the least lies at the peak of static friction.  Both are affine in
 (x, u), as the modes are: f_s is linearised where it is least.
+
+Source: Karnopp 1985 (a velocity that rests, and the force that ends it).
 """
 
 from __future__ import annotations
@@ -106,9 +108,9 @@ def least_rate(
 ) -> np.ndarray:
     """The rate of a signal where it points outwards least, as a row over (x, u, 1).
 
-    ``probes`` are values of the signal in ``column`` that are tried at a point (x, u), the side
-    outwards is 1 or -1.  What hinders in proportion to the signal, by its slope at the last probe,
-    does not count: viscous friction holds nothing.
+    ``probes``, (n,), are values of the signal in ``column`` that are tried at a point (x, u), shape
+    (n_x + n_u,); the side outwards is 1 or -1.  What hinders in proportion to the signal, by its
+    slope at the last probe, does not count: viscous friction holds nothing.
     """
     n = len(model.states)
     around = np.tile(point[:, None], len(probes))

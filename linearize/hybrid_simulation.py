@@ -120,7 +120,7 @@ class SampledHybrid:
         return covered.argmax(axis=1)
 
     def stopped(self, x: np.ndarray, later: np.ndarray) -> np.ndarray:
-        """Later states, inside of a holding interval where a step would jump across it."""
+        """Later states, (n_w, n_x), inside of a holding interval that a step would jump across."""
         for column, below, above, inside in self._intervals:
             fell = (x[:, column] >= above) & (later[:, column] <= below)
             rose = (x[:, column] <= below) & (later[:, column] >= above)
@@ -128,7 +128,7 @@ class SampledHybrid:
         return later
 
     def jumped(self, x: np.ndarray, later: np.ndarray) -> np.ndarray:
-        """Later states, with what jumps where a signal rises to its value in between."""
+        """Later states, (n_w, n_x), after what jumps where a signal rises to its value."""
         model = self.hybrid.model
         for jump in self.hybrid.jumps:
             signal, state = model.states.index(jump.signal), model.states.index(jump.state)
@@ -193,7 +193,10 @@ def _guards(modes: Sequence[Mode], names: tuple[str, ...]) -> np.ndarray:
 
 
 def whole_step(hybrid: HybridModel, mode: Mode, sample_time_s: float) -> np.ndarray:
-    """[F G offset] over all states and commands: what the mode holds stays, its rates are zero."""
+    """[F G offset] over all states and commands, shape (n_x, n_x + n_u + 1).
+
+    What the mode holds stays, its rates are zero.
+    """
     step, model = sampled(mode, sample_time_s), hybrid.model
     names = (*model.states, *model.commands)
     kept = [names.index(name) for name in mode.state_names]

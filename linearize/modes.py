@@ -7,6 +7,8 @@ intervals, a switched command into its levels, and every combination of them is 
 A mode says how friction enters it.  Sliding, the velocity at the point fixes the direction, so
 that dry friction is a constant of the drift and only its slope stands in A.  Sticking, position
 and velocity are held and leave the model.
+
+Source: paper 003, Sec. V, with the errata E003-2 to E003-4: A = df/dx at (x0, u0), drift kept.
 """
 
 from __future__ import annotations
@@ -78,7 +80,7 @@ class Mode:
 
     @property
     def scaled(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """A, B and C with every state in units of its scale."""
+        """A, B and C, shapes as above, with every state in units of its scale."""
         size = self.scale
         return self.A * size / size[:, None], self.B / size[:, None], self.C * size
 
@@ -103,7 +105,7 @@ class Mode:
         return control.ss(A, B, C, self.D, name=self.name, **labels)
 
     def sent(self, model: DesignModel, command: np.ndarray) -> np.ndarray:
-        """All commands of the model: the mode's own, and switches at their level."""
+        """All commands of the model, (n_u,): the mode's own, and switches at their level."""
         own = dict(zip(self.command_names, command, strict=True))
         return np.array([own[n] if n in own else self.box[n].point for n in model.commands])
 

@@ -2,6 +2,8 @@
 
 Every window starts at the plant's true state and gets its commands.  The error of a state counts
 in units of its scale.
+
+Source: prediction error method, Ljung 1999, "System Identification", Sec. 7.
 """
 
 from __future__ import annotations
@@ -64,8 +66,6 @@ def fitted_single(hybrid: HybridModel, windows: Windows) -> SampledHybrid:
     One step ahead by linear least squares, then over the whole horizon by damped Gauss-Newton steps
     from there, with exact derivatives of the run over the horizon.  It is judged on what it was
     fitted to, so no other single model is treated as well.
-
-    Source: prediction error method, Ljung 1999, "System Identification", Sec. 7.
     """
     single = single_of(hybrid, hybrid.modes[0], windows.sample_time_s)
     n, m = len(windows.states), len(windows.commands)

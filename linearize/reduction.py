@@ -4,6 +4,8 @@ A controller is designed on fewer states than the plant has, because some of the
 be controlled (a bristle at -2e4 1/s), change the force too little to be worth a gain (gas masses)
 or can be undone in the command (the dead zone).  Each is one :class:`LeftOut`, so the reduction
 can be printed, and undone one line at a time.
+
+Source: paper 003, Sec. V.A, which lists what it leaves out; physics.md 1.2 (level 3) and 4.3.
 """
 
 from __future__ import annotations

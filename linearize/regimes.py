@@ -1,4 +1,7 @@
-"""Where the flow into a chamber is choked and where not, read off the plant's own flow paths."""
+"""Where the flow into a chamber is choked and where not, read off the plant's own flow paths.
+
+Source: ISO 6358 and the nozzle, physics.md 1.1; regimes by mode, physics.md 4.3.
+"""
 
 from __future__ import annotations
 

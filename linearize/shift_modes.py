@@ -35,6 +35,7 @@ from linearize.shifting import (
     POSITION,
     PRESSURES,
     VELOCITY,
+    carried_share,
     driving_model,
     shift_model,
     switched_shift_model,
@@ -214,11 +215,9 @@ def neutral_guards(model: DesignModel) -> tuple[Guard, ...]:
 def picked_up(model: DesignModel) -> tuple[Jump, ...]:
     """The main piston picks up the floating one at Neutral on its way up, and slows down.
 
-    The impact is plastic: m_L v = m_H v+.  Both masses are those of the model, read off what p1
-    does on either side, A1/m.  On the way down the floating piston stays behind at its shoulder.
+    On the way down the floating one stays behind at its shoulder.
     """
-    low, high = (_slope(model, side)[0][PRESSURES[0]] for side in (-1.0, 1.0))
-    return (Jump(POSITION, 0.0, VELOCITY, high / low),)
+    return (Jump(POSITION, 0.0, VELOCITY, carried_share(model)),)
 
 
 def valve_flows(plant: Plant) -> Callable[[float, float], np.ndarray]:
@@ -249,18 +248,13 @@ def _placing(inputs: tuple[str, str], points: ShiftPoints):
 
 def _push(model: DesignModel, side: float) -> Guard:
     """The force at rest on one side of Neutral, over the mass, towards it."""
-    slopes, offset = _slope(model, side)
-    return Guard({name: -side * slope for name, slope in slopes.items()}, -side * offset)
-
-
-def _slope(model: DesignModel, side: float) -> tuple[dict[str, float], float]:
-    """The acceleration at rest beside Neutral: by pressure in m/(s2 Pa), and without pressure."""
     x, u = model.initial.copy(), np.zeros(len(model.commands))
     x[model.states.index(POSITION)], row = side * BESIDE_M, model.states.index(VELOCITY)
     columns = [model.states.index(name) for name in PRESSURES]
     slope = model.jacobians(x, u)[0].full()[row, columns]
     offset = float(model.f(x, u)[0][row]) - slope @ x[columns]
-    return dict(zip(PRESSURES, map(float, slope), strict=True)), float(offset)
+    weights = dict(zip(PRESSURES, map(float, -side * slope), strict=True))
+    return Guard(weights, -side * float(offset))
 
 
 def _rising(values: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -15,7 +15,14 @@ from __future__ import annotations
 import casadi as ca
 
 from linearize.reduction import DesignModel
-from linearize.shifting import POSITION, PRESSURES, VELOCITY, switched_shift_model
+from linearize.shifting import (
+    INSIDE_M,
+    POSITION,
+    PRESSURES,
+    VELOCITY,
+    carried_share,
+    switched_shift_model,
+)
 from workbench.effects.forces import EndStops
 from workbench.effects.stribeck_friction import StribeckFriction
 from workbench.plant import Plant
@@ -24,7 +31,6 @@ from workbench.plants.gearbox import MAIN
 GAMMA = 1.0 - 0.5**0.5
 STEEPNESS_S_M = 300.0  # of dry friction: full at 10 mm/s, and no faster than a sample resolves
 LEAST_PA = 2e4  # a pressure that a step has missed; no gas is there
-INSIDE_M = 1e-6
 REBOUND = 0.2  # of the speed at a stop, read off the whole plant: the finger takes part in it
 
 
@@ -66,7 +72,7 @@ def one_sample(model: DesignModel, stroke_m: float, dt: float, *, stops: bool) -
         later[row] = ca.fmax(later[row], LEAST_PA)
     met_m_s = later[speed]
     taken = ca.logic_and(x[place] <= 0.0, later[place] > 0.0)
-    later[speed] *= ca.if_else(taken, _carried(model), 1.0)
+    later[speed] *= ca.if_else(taken, carried_share(model), 1.0)
     if stops:
         outwards = ca.fabs(later[place]) >= stroke_m
         outwards = ca.logic_and(outwards, later[place] * later[speed] > 0.0)
@@ -85,19 +91,3 @@ def _rates(model: DesignModel, stroke_m: float) -> ca.Function:
     none, first, second = (f(inside, u) for u in ([0, 0], [1, 0], [0, 1]))
     mixed = none + share[0] * (first - none) + share[1] * (second - none)
     return ca.Function("rates", [x, share], [ca.cse(mixed)])
-
-
-def _carried(model: DesignModel) -> float:
-    """Share of its speed that the main piston keeps as it picks the floating one up.
-
-    That is the ratio of the moving masses, seen in what one pressure does on either side.
-    """
-    return _push(model, INSIDE_M) / _push(model, -INSIDE_M)
-
-
-def _push(model: DesignModel, place_m: float) -> float:
-    """Acceleration by the pressure of chamber 1, at rest at a place, m/s2 per Pa."""
-    x = model.initial.copy()
-    x[model.states.index(POSITION)] = place_m
-    row, column = model.states.index(VELOCITY), model.states.index(PRESSURES[0])
-    return float(model.jacobians(x, [0.0, 0.0])[0][row, column])

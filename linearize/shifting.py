@@ -28,6 +28,7 @@ POSITION, VELOCITY = f"{MAIN}.position_m", f"{MAIN}.velocity_m_s"
 PRESSURES = ("chamber_1.pressure_pa", "chamber_2.pressure_pa")
 STATES = (*PRESSURES, POSITION, VELOCITY)
 MASSES = ("chamber_1.mass_kg", "chamber_2.mass_kg")
+INSIDE_M = 1e-6  # beside Neutral or a stop: on one side of it
 FLOWS = ("valve_1.flow_kg_s", "valve_2.flow_kg_s")
 
 
@@ -118,6 +119,23 @@ def driving_model(plant: Plant) -> DesignModel:
     whole = _reduced(fed_by_flows(plant.lean()), REPLACED, ())
     left_out = tuple(item for item in whole.left_out if item is not GAS)
     return replace(whole, states=(*PRESSURES, *MASSES, POSITION, VELOCITY), left_out=left_out)
+
+
+def carried_share(model: DesignModel) -> float:
+    """Share of its speed that the main piston keeps as it picks the floating one up at Neutral.
+
+    The impact is plastic, m_L v = m_H v+.  The ratio of the moving masses is that of the model: it
+    shows in what the pressure of chamber 1 does on either side, A1/m.
+    """
+    return _push(model, INSIDE_M) / _push(model, -INSIDE_M)
+
+
+def _push(model: DesignModel, place_m: float) -> float:
+    """Acceleration by the pressure of chamber 1, at rest at a place, m/s2 per Pa."""
+    x = model.initial.copy()
+    x[model.states.index(POSITION)] = place_m
+    row, column = model.states.index(VELOCITY), model.states.index(PRESSURES[0])
+    return float(model.jacobians(x, [0.0, 0.0])[0][row, column])
 
 
 def _reduced(plant: Plant, valves: LeftOut, omitted: tuple[Omission, ...]) -> DesignModel:

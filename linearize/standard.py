@@ -1,14 +1,15 @@
-"""The standard modes of each plant: where its signals are cut, and where the points lie."""
+"""The standard modes of each plant: where its signals are cut, and where the points lie.
+
+Source: physics.md 4.2 (gearbox) and 4.3 (all others).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 
 from linearize.axes import DRIVE, drive_axis, joint_axes, rig_axis, travel_axis
-from linearize.axis import Axis
 from linearize.cylinder_modes import place_modes
 from linearize.cylinder_modes import regime_modes as modes_by_regime
-from linearize.cylinder_modes import sliding_modes as modes_of_sliding
 from linearize.equilibrium import OperatingPoint
 from linearize.leg_modes import joint_modes, leg_modes, leg_regimes
 from linearize.modes import HybridModel, Interval, hybrid_modes
@@ -56,7 +57,7 @@ def _crr_rig(plant: Plant) -> HybridModel:
 
 
 def _crr_arm(plant: Plant) -> HybridModel:
-    return place_modes(plant, _only_joint(plant), design_model(plant))
+    return place_modes(plant, travel_axis(plant), design_model(plant))
 
 
 def _crr_leg(plant: Plant) -> HybridModel:
@@ -125,19 +126,6 @@ REGIME_MODES: dict[str, Callable[[Plant], HybridModel]] = {
 """Valve x flow regimes x friction x stops, for plants whose standard modes may be fewer."""
 
 
-def _only_joint(plant: Plant) -> Axis:
-    (axis,) = joint_axes(plant)
-    return axis
-
-
-AXES: dict[str, Callable[[Plant], Axis]] = {
-    "servo_drive": drive_axis,
-    "crr_rig": rig_axis,
-    "crr_arm": _only_joint,
-}
-"""Plants with one axis that a proportional valve drives."""
-
-
 def standard_modes(plant: Plant) -> HybridModel:
     """The standard modes of a plant.
 
@@ -158,19 +146,6 @@ def regime_modes(plant: Plant) -> HybridModel:
         If its kind has none.
     """
     return _among(REGIME_MODES, plant, "no modes by flow regimes for")
-
-
-def sliding_modes(plant: Plant) -> HybridModel:
-    """Steady slides both ways by place, of a plant with one axis behind a proportional valve.
-
-    Raises
-    ------
-    UnknownNameError
-        If it has no such axis.
-    """
-    if plant.name not in AXES:
-        raise UnknownNameError(_none(AXES, plant, "no one axis behind a proportional valve on"))
-    return modes_of_sliding(plant, AXES[plant.name](plant), design_model(plant))
 
 
 def slide_modes(plant: Plant) -> HybridModel:
@@ -232,9 +207,6 @@ def _among(
     known: dict[str, Callable[[Plant], HybridModel]], plant: Plant, none: str
 ) -> HybridModel:
     if plant.name not in known:
-        raise UnknownNameError(_none(known, plant, none))
+        names = ", ".join(known)
+        raise UnknownNameError(f"{none} {plant.name}; there are some for {names}")
     return known[plant.name](plant)
-
-
-def _none(known: Iterable[str], plant: Plant, none: str) -> str:
-    return f"{none} {plant.name}; there are some for {', '.join(known)}"

@@ -4,12 +4,14 @@ Coil and armature of a solenoid valve answer late, later to a release than to an
 bounce on their seats; a pulse of a few milliseconds opens a valve for another time than it lasts.
 None of that depends on the gas.  With a least time between two switches of a valve the histories
 of commands that matter are few, and each is run once when the controller is designed.
+
+Source: physics.md 2.5 (coil, armature, and what the ports pass).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import casadi as ca
 import numpy as np
@@ -92,10 +94,21 @@ class ValveResponse:
 
 
 def packed(commands: np.ndarray) -> np.ndarray:
-    """Commands 0 and 1 ahead, shape (..., N), as one integer for the first k of them each."""
-    k = np.arange(commands.shape[-1])
-    weights = np.where(k[:, None] <= k, 1 << np.maximum(k - k[:, None], 0), 0)
-    return commands.astype(np.int64) @ weights
+    """Commands 0 and 1 ahead, shape (..., N), as one integer for the first k of them each.
+
+    It holds the newest MEMORY of them; older ones do not count.
+    """
+    return (commands.astype(float) @ _weights(commands.shape[-1])).astype(np.int64)
+
+
+@cache
+def _weights(number: int) -> np.ndarray:
+    """What each command weighs in the integers of its successors, shape (N, N).
+
+    In floats, in which products of matrices are fast and these sums exact.
+    """
+    later = np.arange(number) - np.arange(number)[:, None]
+    return np.where((later >= 0) & (later < MEMORY), 2.0 ** np.clip(later, 0, MEMORY), 0.0)
 
 
 def age(history: int) -> int:

@@ -10,6 +10,7 @@ import numpy as np
 
 from estimators import ESTIMATORS
 from estimators.ahead import in_time
+from estimators.scheduled_kalman import noise_for
 from linearize.axes import stroke_m
 from linearize.standard import POSITION, PRESSURES, VELOCITY
 from studies.closed_loop_metrics import Metrics, measure, table
@@ -73,7 +74,10 @@ def standard_estimator(name: str, plant: Plant, sample_time_s: float) -> Estimat
     noise = {key: float(np.hypot(s, coarse.get(key, 0.0))) for key, s in hardware.noise.items()}
     process = {key: size for key, size in PROCESS_NOISE.items() if key in lean.model.states}
     found = ESTIMATORS[name](
-        plant=lean, sample_time_s=sample_time_s, measurement_noise=noise, process_noise=process
+        plant=lean,
+        sample_time_s=sample_time_s,
+        measurement_noise=noise,
+        process_noise=noise_for(ESTIMATORS[name], lean, process),
     )
     return in_time(found, lean)
 

@@ -18,7 +18,7 @@ from studies.followers import (
     follower_numbers,
     follower_runs,
     follower_text,
-    shares,
+    labelled_shares,
 )
 from studies.kept import Kept
 from studies.study import Claim, Extent, Outcome, Study
@@ -75,14 +75,10 @@ def together(drive: Outcome, found: Runs) -> Outcome:
     """What came out on the drive, and on the other plants."""
     from studies.figures.followers import follower_figure
 
-    drawn = {
-        name: {f"{scenario} {figure}": v for (scenario, figure), v in shares(runs).items()}
-        for name, runs in found.items()
-    }
     return Outcome(
         f"{drive.text}\n\n{follower_text(found)}",
         (*drive.claims, *follower_claims(found)),
-        {**drive.figures, "followers": follower_figure(drawn)},
+        {**drive.figures, "followers": follower_figure(labelled_shares(found))},
         {**drive.numbers, **follower_numbers(found)},
     )
 

@@ -13,8 +13,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from controllers.design_file import design, write_design
-from linearize.listing import left_out
-from linearize.listing import table as mode_table
 from linearize.standard import standard_modes
 from studies.checking import styled_figures
 from studies.closed_loop_check import Check, check
@@ -27,6 +25,7 @@ from studies.figures.improvement import before_after_figure
 from studies.figures.modes import pole_figure
 from studies.figures.style import save_all
 from studies.figures.summary import summary_figure
+from studies.modes_text import modes_text
 from studies.report.page import FIGURES, Section, write_report
 from studies.text_of_comparison import comparison_text
 from studies.text_of_results import addition_text, diagnosis_text, unit_names
@@ -139,9 +138,9 @@ def _add(story: Story, rig: Rig, found: Diagnosis) -> Rig:
 def _linearise(story: Story, rig: Rig) -> None:
     story.say("linearising")
     hybrid = standard_modes(rig.plant)
-    export_modes(hybrid, story.folder / "modes", story.command)
+    table = modes_text(hybrid, ())
+    export_modes(hybrid, story.folder / "modes", story.command, table)
     text = "Valve, friction and place on the stroke are cut; each box has its own affine model."
-    table = f"{mode_table(hybrid)}\n\nleft out of the modes:\n{left_out(hybrid)}"
     story.tell("The improved plant as modes", text, table, {"poles": pole_figure(hybrid)})
 
 

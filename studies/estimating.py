@@ -8,7 +8,7 @@ hidden of which the estimators know nothing, and with stretches in which nothing
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -16,8 +16,10 @@ from typing import Any
 import numpy as np
 
 from estimators import ESTIMATORS
-from estimators.scheduled_kalman import noise_of_modes
+from estimators.observed import Observed, observed
+from estimators.scheduled_kalman import noise_for
 from estimators.tuning import TunedNoise, tuned_noise
+from studies.estimated import Estimated, EstimatedRecording
 from studies.estimator_runs import (
     Followed,
     fed,
@@ -42,56 +44,6 @@ GAP_S, APART_S = 0.05, 0.25  # a hole in all outputs, and from one to the next
 ASKED = 500  # innovations and starts of a prediction in a run
 SHARES = {"velocity_m_s": 0.1, "velocity_rad_s": 0.1, "pressure_pa": 0.01}  # of a state's scale
 AMONG_HIDDEN = ("constant_force", "chamber_leak")  # the first that a plant may lack
-
-
-@dataclass(frozen=True)
-class Estimated:
-    """One estimator on one recording.
-
-    Attributes
-    ----------
-    horizons
-        RMS error of each output, (n_y,), so many seconds after an estimate.
-    nis
-        Mean innovation squared over its covariance, per received output: 1 if it is consistent.
-    coloured
-        Share of lags at which innovations are correlated, by output, (n_y,).
-    state_rmse, hidden_rmse
-        By state of the plant in the simulation, and with the effect hidden in it.
-    gap_rmse
-        RMS error of each output, (n_y,), at the end of the holes of the simulation.
-    simulated
-        The run on the simulation.
-    """
-
-    name: str
-    horizons: Mapping[float, np.ndarray]
-    nis: float
-    coloured: np.ndarray
-    median_s: float
-    p99_s: float
-    state_rmse: Mapping[str, float]
-    hidden_rmse: Mapping[str, float]
-    gap_rmse: np.ndarray
-    simulated: Followed
-
-
-@dataclass(frozen=True)
-class EstimatedRecording:
-    """All estimators on one recording, with what they were told and what is true.
-
-    ``lost`` says of estimators that have no row why.
-    """
-
-    name: str
-    outputs: tuple[str, ...]
-    sample_time_s: float
-    noise: Mapping[str, float]
-    tuned: TunedNoise
-    hidden: str
-    truth: Recording
-    rows: tuple[Estimated, ...]
-    lost: Mapping[str, str]
 
 
 def estimate_rig(
@@ -151,6 +103,7 @@ class _Bench:
             tuned,
             hidden,
             self.simulated,
+            self.observed,
             tuple(rows),
             lost,
         )
@@ -161,7 +114,7 @@ class _Bench:
         dt = self.recording.sample_time_s
         plant, u, y = fed(self.plant, self.recording)
         found = follow(estimator, u, y, every)
-        steps = {max(round(h / dt), 1): h for h in HORIZONS_S}
+        steps = {k: k * dt for k in (max(round(h / dt), 1) for h in HORIZONS_S)}
         starts = np.arange(len(self.recording) // 10, len(self.recording), every)
         ahead = foretold(found, plant, u, y, dt, steps, starts)
         asked = found.received > 0
@@ -206,14 +159,21 @@ class _Bench:
     def _made(self, name: str) -> Any:
         plant = self.plant.with_inputs_commanded()
         states, size = plant.model.states, self.deviations
-        noise = self.tuned.process_noise
+        noise = noise_for(ESTIMATORS[name], plant, self.tuned.process_noise)
         return ESTIMATORS[name](
             plant=plant,
             sample_time_s=self.recording.sample_time_s,
             measurement_noise=self.noise,
-            process_noise=noise_of_modes(plant, noise) if name == "kalman" else noise,
+            process_noise=noise,
             initial_deviation=dict(zip(states, size, strict=True)),
         )
+
+    @cached_property
+    def observed(self) -> Observed:
+        """How well the outputs determine the states along the simulation."""
+        _, u, _ = fed(self.plant, self.recording)
+        states = self.simulated.rows(self.plant.model.states)
+        return observed(self._made("ekf").filter, states, u)
 
     @cached_property
     def recording(self) -> Recording:

@@ -11,6 +11,7 @@ from scipy.signal import lfilter
 
 from estimators import ESTIMATORS
 from estimators.augmentation import AugmentedPlant, Unknown, augmented
+from estimators.scheduled_kalman import noise_for
 from estimators.tuning import tuned_noise
 from studies.estimator_truths import TrueRun
 from workbench.effects.empirical import ConstantFlow
@@ -35,9 +36,6 @@ SENSORS = {  # noise and grid of physics.md section 2 together
 CORNER_HZ, FORCE_N = 20.0, 1.0  # of the process disturbance, physics.md section 2
 FLOW_KG_S = 0.005 * 25.7e-3
 NUMERICAL = {VELOCITY: 2e-3, **dict.fromkeys(OUTPUTS[1:], 50.0)}  # two integrators differ
-# What closed loops use.  With less, half of the runs that start half a bar off are lost: a filter
-# that is sure of the speed puts the surprise of the first break-away into the pressures.
-BREAKING_AWAY = {VELOCITY: 0.1}
 AT_REST = {  # deviations of a drive that stands at room temperature
     "slide.position_m": 2e-5,
     VELOCITY: 2e-3,
@@ -87,7 +85,7 @@ def made(
         plant=plant,
         sample_time_s=1.0 / 400 if plant.name == "soft_joint" else 1e-3,
         measurement_noise={n: SENSORS[n] for n in plant.measured},
-        process_noise=process_noise,
+        process_noise=noise_for(ESTIMATORS[name], plant, process_noise),
         initial_deviation=start,
     )
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,7 +13,6 @@ from workbench.errors import whole_file
 
 if TYPE_CHECKING:
     from linearize.modes import HybridModel
-    from linearize.regions import Validity
     from workbench.diagnosis.result import NextRecording
     from workbench.rig import Rig
 
@@ -22,29 +20,29 @@ ARRAYS = ("A", "B", "C", "D", "state", "command", "output", "drift", "scale")
 NAMES = ("state_names", "command_names", "output_names")
 
 
-def export_modes(
-    hybrid: HybridModel, folder: Path, command: str, regions: Sequence[Validity] = ()
-) -> None:
-    """modes.mat, .npz and .txt; poles.*, mode_map.* and step.*.
+def export_modes(hybrid: HybridModel, folder: Path, command: str, text: str) -> None:
+    """modes.mat, .npz and .txt; poles.*, mode_poles.*, mode_map.* and step.*.
 
-    The MAT file holds a struct array with A, B, C, D, point and drift; the NumPy file the same
-    arrays as ``A_0``, ``A_1`` and so on, and the names as ``name``, ``state_names_0``, ...  The
-    map shows where each mode is active, the step the modes beside the plant; neither of cuts that
-    do not cover them.
+    ``text`` is the table.  The MAT file holds a struct array with A, B, C, D, point and drift; the
+    NumPy file the same arrays as ``A_0``, ``A_1`` and so on, and the names as ``name``,
+    ``state_names_0``, ...  The map shows where each mode is active, the step the modes beside the
+    plant; neither of cuts that do not cover them.  Each mode has its own pole map where there are
+    at most 64.
     """
     from linearize.hybrid_simulation import sampled_hybrid
-    from studies.figures.modes import pole_figure
+    from studies.figures.modes import SINGLE_MAPS, mode_poles_figure, pole_figure
     from studies.mode_pictures import map_figure, step_figure, step_of
     from studies.mode_views import VIEWS, view_of
-    from studies.modes_text import modes_text
 
     with whole_file(folder / "modes.mat") as unfinished:
         _write_mat(hybrid, unfinished)
     with whole_file(folder / "modes.npz") as unfinished:
         _write_npz(hybrid, unfinished)
     with whole_file(folder / "modes.txt") as unfinished:
-        unfinished.write_text(modes_text(hybrid, regions) + "\n", encoding="utf-8")
+        unfinished.write_text(text + "\n", encoding="utf-8")
     save(pole_figure(hybrid), folder / "poles", command)
+    if len(hybrid.modes) <= SINGLE_MAPS:
+        save(mode_poles_figure(hybrid), folder / "mode_poles", command)
     if hybrid.plant.name not in VIEWS:
         return
     try:

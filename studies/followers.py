@@ -84,6 +84,14 @@ def shares(runs: Sequence[Run]) -> dict[tuple[str, str], np.ndarray]:
     return {(s, f): np.array([_share(run, s, f) for run in runs]) for s, f in keys}
 
 
+def labelled_shares(found: Runs) -> dict[str, dict[str, np.ndarray]]:
+    """The same by plant, and by scenario and figure in words."""
+    return {
+        name: {f"{s}, {_words(f)}": values for (s, f), values in shares(runs).items()}
+        for name, runs in found.items()
+    }
+
+
 def _share(run: Run, scenario: str, figure: str) -> float:
     if scenario not in run:
         return np.inf

@@ -8,7 +8,7 @@ them, ten times as fine, is what the modes are placed on and judged by.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -37,9 +37,10 @@ APART_S = 0.05  # between the starts of windows: enough of them, and none counts
 
 @dataclass(frozen=True)
 class Judged:
-    """Errors over 50 ms on one manoeuvre: of the placed modes, and of the best single model."""
+    """Errors over 50 ms on one manoeuvre: of placed modes, those without jump, a single model."""
 
     placed: PredictionError
+    smooth: PredictionError
     single: PredictionError
 
     @property
@@ -71,13 +72,14 @@ def driven(
     say("the gearbox through its manoeuvres")
     base = driving_modes(default_rig("gearbox").plant)
     hybrid = placed_modes(base, joined([*map(_gone, PLACED_ON)]), number, OFTEN["gearbox"])
-    modes, judged = sampled_hybrid(hybrid, SAMPLE_TIME_S / FINE["gearbox"]), {}
+    step_s, judged = SAMPLE_TIME_S / FINE["gearbox"], {}
+    modes, smooth = (sampled_hybrid(each, step_s) for each in (hybrid, replace(hybrid, jumps=())))
     for each in judged_on:
         recording = manoeuvre(*each)
         say(f"a single linear model of the gearbox, fitted to {recording.name}")
         there = windows(_gone(each), apart_s=apart_s)
-        single = prediction_of(fitted_single(base, there), there)
-        judged[recording.name] = Judged(prediction_of(modes, there), single)
+        models = (modes, smooth, fitted_single(base, there))
+        judged[recording.name] = Judged(*(prediction_of(model, there) for model in models))
     return Driving(hybrid, judged)
 
 
@@ -102,7 +104,11 @@ def driving_table(found: Driving) -> str:
     names = found.hybrid.model.states
     lines = []
     for name, judged in found.judged.items():
-        rows = {"placed modes": judged.placed, "one linear model, fitted": judged.single}
+        rows = {
+            "placed modes": judged.placed,
+            "without their jump": judged.smooth,
+            "one linear model, fitted": judged.single,
+        }
         for what, error in rows.items():
             numbers = (f"{error.total:.4f}", f"{error.total / judged.single.total:.2f}")
             lines.append((f"{name}: {what}", *numbers, *(f"{v:.3f}" for v in error.by_state)))

@@ -133,6 +133,7 @@ def _gearbox(plant: Plant) -> View:
         panels=panels,
         spans=((0.002, sent[0]), (0.01, sent[1]), (0.01, sent[2])),
         sample_time_s=1e-4,
+        shown=6,
     )
 
 

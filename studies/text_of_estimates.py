@@ -11,7 +11,7 @@ from studies.text import columns, number, percent, shown
 from workbench.units import public_name, si_unit
 
 if TYPE_CHECKING:
-    from studies.estimating import Estimated, EstimatedRecording
+    from studies.estimated import Estimated, EstimatedRecording
 
 DEFINED = (
     "nis: innovation squared over its covariance per output, 1 if consistent; coloured: lags at "
@@ -43,6 +43,7 @@ def _recording_text(each: EstimatedRecording) -> str:
             f"on the rig's plant under the recorded inputs: RMS error by state, with "
             f"{each.hidden} hidden, and of outputs after 50 ms without any",
             _states(each),
+            _seen(each),
             *(f"{name}: {why}" for name, why in each.lost.items()),
         )
     )
@@ -70,12 +71,29 @@ def _predictions(each: EstimatedRecording) -> str:
 
 def _states(each: EstimatedRecording) -> str:
     names = list(dict.fromkeys(name for row in each.rows for name in row.state_rmse))
-    head = ["state", *(f"{row.name}{what}" for row in each.rows for what in ("", " hidden"))]
-    lines = [[public_name(name), *_of_state(each, name)] for name in names]
+    head = [
+        "state",
+        "known to",
+        *(f"{row.name}{what}" for row in each.rows for what in ("", " hidden")),
+    ]
+    known = each.observed.within
+    lines = [
+        [public_name(name), shown(known.get(name, np.nan), name, 2), *_of_state(each, name)]
+        for name in names
+    ]
     for k, name in enumerate(each.outputs):
         after = (pair for row in each.rows for pair in (shown(row.gap_rmse[k], name, 3), "-"))
-        lines.append([f"{public_name(name)} after a hole", *after])
+        lines.append([f"{public_name(name)} after a hole", "-", *after])
     return columns(head, lines)
+
+
+def _seen(each: EstimatedRecording) -> str:
+    """Which states the outputs do not determine."""
+    outputs, unseen = (", ".join(map(public_name, v)) for v in (each.outputs, each.observed.unseen))
+    told = "known to: least standard deviation that the outputs allow, given model and noise\n"
+    if not unseen:
+        return f"{told}every state is seen by {outputs}"
+    return f"{told}not observable from {outputs}: {unseen}"
 
 
 def _of_state(each: EstimatedRecording, name: str) -> list[str]:
@@ -99,6 +117,8 @@ def _recording_document(each: EstimatedRecording) -> dict[str, Any]:
         "noise": {public_name(n): _value(v, n) for n, v in each.noise.items()},
         "process_noise_factors": dict(each.tuned.factors),
         "hidden": each.hidden,
+        "known_to": {public_name(n): _value(v, n) for n, v in each.observed.within.items()},
+        "not_observable": [public_name(name) for name in each.observed.unseen],
         "lost": dict(each.lost),
         "estimators": [_row_document(each, row) for row in each.rows],
     }

@@ -132,14 +132,12 @@ def where_text(found: Diagnosis) -> str:
         "where: " + ", ".join(f"{public_name(k)} {number(v)}" for k, v in gains)
         + " (log-likelihood gained by an unknown input)"
     ]  # fmt: skip
-    lines.append(
-        f"missing term of {where.balance} follows "
-        + ", ".join(f"{public_name(d.variable)} {percent(d.explains)}" for d in where.against[:3])
-    )
+    follows = [f"{public_name(d.variable)} {percent(d.explains)}" for d in where.against[:3]]
+    if follows:
+        lines.append(f"missing term of {where.balance} follows {', '.join(follows)}")
     lines += [] if where.memory is None else [_memory_text(*where.memory)]
-    shares = list(where.by_regime.items())[:4]
-    lines.append("error in: " + ", ".join(f"{name} {percent(share)}" for name, share in shares))
-    return "\n".join(lines)
+    shares = [f"{name} {percent(share)}" for name, share in where.by_regime.items()][:4]
+    return "\n".join([*lines, *([f"error in: {', '.join(shares)}"] if shares else [])])
 
 
 def _memory_text(followed: Dependence, loop: Loop) -> str:

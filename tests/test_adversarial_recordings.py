@@ -16,7 +16,7 @@ from test_diagnosis import bench, nothing
 from studies import adversarial as spoil
 from studies.demo import DATA
 from workbench.comparison import compare
-from workbench.consistency import Weight, examined, trusted
+from workbench.consistency import Finding, Weight, examined, trusted
 from workbench.diagnosis.diagnose import diagnose
 from workbench.diagnosis.result import Verdict
 from workbench.errors import InputError
@@ -82,6 +82,12 @@ def test_a_misread_servo_drive_is_refused_with_what_is_wrong(demo, way):
         trusted(rig, [spoil.SERVO_DRIVE[way](train)])
 
     assert MISREAD[way] in str(error.value).replace(": ", " ")
+
+
+def test_a_refusal_reads_as_a_warning_does():
+    found = Finding(Weight.REFUSED, "run.csv", "cap.pressure", "is noise", "check the wiring")
+
+    assert str(found.message) == str(found) == "run.csv: cap.pressure: is noise; check the wiring"
 
 
 def test_every_spoiled_recording_of_several_is_named(demo):

@@ -1,5 +1,6 @@
 """Bad recordings: one clear message each, with the place and what was expected."""
 
+import numpy as np
 import pytest
 from recording_files import RIG, N, read, refused, table, text
 
@@ -84,6 +85,8 @@ def test_an_output_that_never_changes_is_refused(tmp_path):
     rows[:, 3] = 145.0
 
     assert "slide.position: is 145 mm in all 400 samples" in refused(tmp_path, text(rows))
+    rows[:3, 3] = np.nan
+    assert "slide.position: is 145 mm in all 397 samples" in refused(tmp_path, text(rows))
 
 
 def test_a_sensor_that_sticks_or_saturates_is_warned_of(tmp_path):

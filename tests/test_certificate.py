@@ -10,7 +10,7 @@ from controllers.certificate import certificate, common_function, dwell_samples
 from controllers.margins import closed, integral_of, loops, unforeseen_s
 from controllers.regulator import RegulatorSpec, regulator
 from controllers.scheduled import driven_modes
-from linearize.standard import sliding_modes, standard_modes
+from linearize.standard import axis_modes, standard_modes
 from studies.design_text import certificate_text
 from workbench.plants.crr_arm import crr_arm
 from workbench.plants.servo_drive import servo_drive
@@ -113,7 +113,7 @@ def test_gains_that_must_not_be_mixed_are_told_from_switching_that_may_be():
 
 def test_the_arms_modes_are_certified_with_their_own_gains_behind_its_sensors():
     """1 ms of the sensors is in the loops."""
-    hybrid = sliding_modes(crr_arm())
+    hybrid = axis_modes(crr_arm())
     made = regulator(hybrid, RegulatorSpec(tolerable=ARM, **TURNS))
     delay_s = unforeseen_s(hybrid.plant)
     found = certificate(loops(hybrid, made.laws, 1e-3, delay_s), 1e-3)

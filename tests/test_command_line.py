@@ -233,7 +233,7 @@ def test_modes_are_printed_and_exported(folder, tmp_path):
     assert arrays["name"].tolist() == [mode["name"] for mode in document["modes"]]
     assert np.array_equal(arrays["B_26"], np.array(document["modes"][26]["B"]))
     drawn = {path.name for path in place.glob("*.pdf")}
-    assert drawn == {"poles.pdf", "mode_map.pdf", "step.pdf"}
+    assert drawn == {"poles.pdf", "mode_poles.pdf", "mode_map.pdf", "step.pdf"}
     assert document["modes"][0]["validity"]["horizon_s"] == 0.05
     assert "half-widths of boxes in which a mode errs less than 0.05" in answer.stdout
 

@@ -75,3 +75,17 @@ def test_a_sine_is_judged_in_its_second_period():
 
     assert scenario.judged_s == pytest.approx(2.0) and len(scenario.reference_m) == 4000
     assert np.ptp(scenario.reference_m) == pytest.approx(0.12, rel=1e-3)
+
+
+def test_the_other_plants_stand_beside_the_drive_in_text_claims_figures_and_numbers():
+    from studies.controllers_study import together
+
+    step = {"overshoot_pa": [2e3, 5e3], "settling_s": [0.02, 0.025]}
+    found = together(outcome(rows()), {"soft_joint": [{"0-1": step}] * 2})
+
+    assert "soft_joint" in found.text and "cascade" in found.text
+    assert len(found.claims) == len(outcome(rows()).claims) + 3
+    assert list(found.figures) == ["yardsticks", "followers"]
+    ticks = [label.get_text() for label in found.figures["followers"].axes[0].get_xticklabels()]
+    assert ticks == ["0-1, overshoot", "0-1, settling"]
+    assert found.numbers["soft_joint"]["design"] == "pressure"

@@ -8,8 +8,8 @@ from conftest import PLANT_MODELS
 from flat_cylinder import assert_same_as_flat
 
 from studies.papers.loops import Pid, tracked
+from studies.papers.network_loop import network
 from workbench.cosimulation import cosimulate
-from workbench.effects import PacketPause, SensorDelay
 from workbench.plants.crr_arm import MOTION, ROD, crr_arm_actuator, crr_arm_engine
 
 DT = 1e-3
@@ -24,7 +24,6 @@ ORACLE_STATES = (
 )
 VISCOUS_ONLY = {"friction.coulomb_force_n": 0.0, "friction.stiction_excess_n": 0.0}
 LINEAR_AREA = {"valve.area_shape_share": 0.0, "valve.underlap_v": 0.0, "valve.clearance_m": 0.0}
-EXCHANGED = ("drive.torque_n_m", *MOTION)
 PLATEAU = 1500  # samples on each step
 
 
@@ -165,12 +164,6 @@ def cosimulated(values, gains, network):
     record = cosimulate(actuator, crr_arm_engine(), pid, reference[None], network)
     error = np.degrees(reference - record[ANGLE])[3000:]
     return np.degrees(record[VELOCITY])[3000:].std(), np.sqrt(np.mean(error**2))
-
-
-def network(redraw_hz=0.0):
-    """1 ms each way, and a redraw."""
-    delay = SensorDelay(name="delay", signals=EXCHANGED, delay_s=1e-3)
-    return delay, PacketPause(name="pause", signals=EXCHANGED, redraw_hz=redraw_hz)
 
 
 @pytest.mark.slow

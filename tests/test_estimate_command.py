@@ -100,7 +100,10 @@ def test_the_command_prints_tables_and_writes_json(place):
     assert answer.exit_code == 0, answer.output
     assert "process noise by likelihood: momentum x" in answer.stdout
     assert "slide.velocity" in answer.stdout
+    assert "every state is seen by slide.position" in answer.stdout
     assert document["schema"] == "workbench.estimates/1"
+    assert document["recordings"][0]["not_observable"] == []
+    assert document["recordings"][0]["known_to"]["slide.velocity"]["value"] < 1e-2
     assert row["estimator"] == "ekf"
     assert row["prediction_rmse"]["0.01 s"]["slide.position"]["unit"] == "m"
 

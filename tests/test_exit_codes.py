@@ -40,9 +40,9 @@ def test_an_unknown_name_reads_as_its_message_and_is_a_key_error(capsys):
     with pytest.raises(typer.Exit), answering(quiet=True):
         raise refused.value
 
-    known = "pid, lq, mpc, cascade, hybrid-mpc, nonlinear-mpc"
-    said = f"no controller lqq; there is {known}; did you mean 'lq'?"
-    assert capsys.readouterr().err == f"workbench: {said}\n"
+    (said,) = capsys.readouterr().err.splitlines()
+    assert said.startswith("workbench: no controller lqq; there is pid, lq, mpc, ")
+    assert said.endswith("; did you mean 'lq'?")
 
 
 def test_a_channel_that_a_recording_lacks_is_wrong_input_with_the_nearest(capsys):

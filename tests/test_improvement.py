@@ -2,12 +2,15 @@
 
 import json
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from test_diagnosis import bench, coulomb, nothing
 
 from studies.figures.improvement import budget_figure
+from studies.figures.style import styled
 from studies.improvement_text import improvement_document, improvement_text
 from studies.truth.draw import EFFECTS
 from studies.truth.pairs import PAIRS, stored_pair
@@ -17,7 +20,7 @@ from workbench.diagnosis import improve as improvement
 from workbench.diagnosis.addition import add, assembled
 from workbench.diagnosis.diagnose import diagnose, silent
 from workbench.diagnosis.improve import improve
-from workbench.diagnosis.improvement import Change
+from workbench.diagnosis.improvement import Change, Stage
 from workbench.diagnosis.passes import Kept, Passes
 from workbench.fitting.errors import per_sample
 from workbench.fitting.linearised import Point
@@ -195,6 +198,34 @@ def test_dropped_and_swapped_steps_are_marked_in_the_budget(improved):
 
     assert {"dropped", "swapped"} <= set(words)
     assert [t.get_text() for t in axes.get_xticklabels()][-1] == "a\nfor b"
+
+
+@pytest.mark.parametrize(
+    ("labels", "degrees"),
+    [
+        (["+ valve_lag", "+ spring_force"], 0.0),
+        (["+ sensor_offset@chamber_a.pressure + spring_force", "+ valve_dead_zone"], 30.0),
+        (["+ sensor_offset@chamber_a.pressure"] * 3, 0.0),
+        (["sensor_scale@chamber_b.pressure for valve_lag"] * 7, 30.0),
+    ],
+)
+def test_labels_of_the_budget_keep_off_each_other(labels, degrees):
+    figure = budget_figure([Stage(label, 2.0, 3.0) for label in ("as it came", *labels)])
+    with styled():
+        FigureCanvasAgg(figure).draw()
+    words = figure.axes[0].get_xticklabels()
+    boxes = [each.get_window_extent() for each in words]
+
+    assert {each.get_rotation() for each in words} == {degrees}
+    assert degrees or not any(one.overlaps(other) for one, other in pairwise(boxes))
+
+
+def test_the_two_of_a_pair_stand_on_lines_of_their_own():
+    pair = Stage("+ sensor_offset@chamber_a.pressure + spring_force", 2.0, 3.0)
+    (axes,) = budget_figure([Stage("as it came", 4.0, 5.0), pair]).axes
+
+    lines = axes.get_xticklabels()[1].get_text().splitlines()
+    assert lines == ["+ sensor_offset", "@chamber_a.pressure", "+ spring_force"]
 
 
 def test_a_free_run_of_the_truth_has_no_error_and_of_another_plant_has():

@@ -11,6 +11,7 @@ from controllers.condensed import MpcSpec
 from controllers.linear_mpc import limited_plan, linear_mpc
 from controllers.lq import dlqr
 from controllers.positioning import STATES
+from controllers.program_solvers import Daqp, Osqp
 from linearize.discrete import sampled
 from linearize.standard import standard_modes
 from workbench.contracts import Estimate
@@ -75,12 +76,13 @@ LIMITS = {
 }
 
 
+@pytest.mark.parametrize("solver", [Daqp(), Osqp()], ids=["daqp", "osqp"])
 @pytest.mark.parametrize("limit", LIMITS)
-def test_each_soft_limit_has_the_solution_of_a_readable_oracle(hybrid, limit):
+def test_each_soft_limit_has_the_solution_of_a_readable_oracle(hybrid, limit, solver):
     """From a state where that limit counts: without it the oracle plans otherwise."""
     numbers, x, position_m = LIMITS[limit]
     spec = MpcSpec(**numbers)
-    program = linear_mpc(hybrid, spec).programs.forward[1]
+    program = linear_mpc(hybrid, spec, solver).programs.forward[1]
     targets = np.tile([position_m, 0.0, 5.9e5, 5.0e5], program.horizon)
     unforced = program.unforced(np.array(x), 0.0)
     g = program.gradient(unforced, targets, 0.1, 0.3)
@@ -91,6 +93,34 @@ def test_each_soft_limit_has_the_solution_of_a_readable_oracle(hybrid, limit):
     assert notes["fallback"] == 0.0
     assert plan.openings[:5] == pytest.approx(wanted[:5], abs=1e-3)
     assert np.abs(oracle(program, spec, np.array(x), targets, limit) - wanted).max() > 0.01
+
+
+def test_both_solvers_make_the_same_step_at_the_limits_and_repeat_it(hybrid):
+    """States all over the range, from the last plan each: within a millivolt, to the last bit."""
+    made = [linear_mpc(hybrid, MpcSpec(), solver) for solver in (Daqp(), Osqp())]
+    rng, at_limits = np.random.default_rng(5), 0
+    for x in REST + [0.1, 1.5, 1.3e5, 1.3e5] * rng.uniform(-1.0, 1.0, (12, 4)):
+        one, other = (
+            c.step(c.step(c.start(), held(c, 0.2), seen(x)), held(c, 0.2), seen(x)) for c in made
+        )
+        again = made[1].step(made[1].start(), held(made[1], 0.2), seen(x))
+        again = made[1].step(again, held(made[1], 0.2), seen(x))
+
+        assert other.notes["fallback"] == one.notes["fallback"] == 0.0
+        assert other.notes["opening_v"] == pytest.approx(one.notes["opening_v"], abs=1e-3)
+        assert np.array_equal(other.value, again.value)
+        at_limits += other.notes["iterations"] > 0
+    assert at_limits >= 5
+
+
+def test_a_program_that_osqp_does_not_finish_has_no_answer(hybrid):
+    program = linear_mpc(hybrid, MpcSpec(), Osqp(most_iterations=2)).programs.forward[1]
+    unforced = program.unforced(FAST, 0.0)
+    g = program.gradient(unforced, np.tile([0.2, 0.0, 5.9e5, 5.0e5], 20), 0.1, 0.3)
+    plan, notes = limited_plan(program, g, *program.bounds(unforced, 0.3), None, 0.1)
+
+    assert notes == {"fallback": 1.0}
+    assert plan.openings == pytest.approx(0.1)
 
 
 def test_mpc_without_limits_and_move_cost_is_the_regulator(hybrid):

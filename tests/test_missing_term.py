@@ -4,10 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from test_report import UNITS, diagnosis
 
 from studies.documents import diagnosis_document
-from studies.figures.diagnosis import diagnosis_figures
+from studies.figures.diagnosis import diagnosis_figures, missing_term_figure
+from studies.figures.style import styled
 from studies.text_of_results import diagnosis_text
 from workbench.diagnosis.dependence import (
     dependences,
@@ -176,3 +178,24 @@ def test_the_figure_shows_both_ways_and_both_intensities(looping):
     labels = [text.get_text() for text in first.get_legend().get_texts()]
     assert labels == ["valve command rising", "valve command falling"]
     assert len(second.lines) == 3  # mean, the other intensity, zero
+
+
+def test_what_is_not_known_of_a_missing_term_has_no_line():
+    found = diagnosis()
+    bare = replace(found, where=replace(found.where, against=(), by_regime={}))
+
+    assert "follows" in diagnosis_text(found, UNITS) and "error in" in diagnosis_text(found, UNITS)
+    text = diagnosis_text(bare, UNITS)
+    assert "where: " in text and "follows" not in text and "error in" not in text
+
+
+def test_the_legend_of_the_missing_term_stands_above_it():
+    where = diagnosis().where
+    swings = replace(where, term=1e-4 * np.cos(3.0 * where.time_s), term_deviation=0 * where.term)
+    figure = missing_term_figure(swings)
+    with styled():
+        FigureCanvasAgg(figure).draw()
+    axes = figure.axes[0]
+
+    highest = axes.transData.transform((0.0, max(axes.lines[0].get_ydata())))[1]
+    assert axes.get_legend().get_window_extent().y0 > highest

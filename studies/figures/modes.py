@@ -1,7 +1,8 @@
-"""The poles of all modes in one plane."""
+"""The poles of modes: all in one plane, by what distinguishes them, and a small map for each."""
 
 from __future__ import annotations
 
+from textwrap import wrap
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +14,8 @@ if TYPE_CHECKING:
 
     from linearize.modes import HybridModel, Mode
 
+SINGLE_MAPS = 64  # more modes have no map each
+ACROSS, LETTERS = 6, 26  # maps side by side, and letters of a line above one
 MARKERS = ("o", "s", "^", "D", "v", "x")
 COLOURS = (BLUE, RED, GREEN, ORANGE)
 
@@ -57,6 +60,36 @@ def pole_figure(hybrid: HybridModel) -> Figure:
             handles, labels = panel.get_legend_handles_labels()
             named |= dict(zip(labels, handles, strict=True))
         figure.legend(named.values(), named.keys(), loc="outside lower center", ncols=len(named))
+    return figure
+
+
+def mode_poles_figure(hybrid: HybridModel) -> Figure:
+    """A pole map for every mode, all to one scale."""
+    number = len(hybrid.modes)
+    across = min(ACROSS, number)
+    down = -(-number // across)
+    with styled():
+        figure = new_figure(PAGE_IN, 0.8 + 1.05 * down)
+        grid = figure.subplots(down, across, sharex=True, sharey=True, squeeze=False)
+        for panel in grid.ravel()[number:]:
+            panel.remove()
+        for k, (panel, mode) in enumerate(zip(grid.ravel(), hybrid.modes, strict=False)):
+            poles = np.linalg.eigvals(mode.A)
+            panel.axvline(0.0, color="0.4", linewidth=0.6)
+            panel.plot(
+                poles.real,
+                poles.imag,
+                "x",
+                color=BLUE,
+                markersize=4,
+                linestyle="none",
+                label="pole",
+            )
+            panel.margins(0.15)
+            panel.set_title("\n".join(wrap(f"{k + 1}  {mode.name}", LETTERS)), fontsize=5.5)
+            panel.tick_params(labelsize=6, labelbottom=k + across >= number)
+        figure.supxlabel("real part (1/s)", fontsize=8)
+        figure.supylabel("imaginary part (rad/s)", fontsize=8)
     return figure
 
 

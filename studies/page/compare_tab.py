@@ -172,12 +172,15 @@ class CompareTab:
             for kind, colour, style in (("m", MEASURED, "solid"), ("s", BLUE, "dashed")):
                 upper.line(
                     TIME, f"{kind}:{name}", source=self._traces.source, color=colour,
-                    line_dash=style, line_width=1.6,
+                    line_dash=style, line_width=1.6, nonselection_line_alpha=1.0,
                 )  # fmt: skip
             self._marks(upper, f"m:{name}")
             unit = label.rpartition("(")[2].rstrip(")")
             lower = self._timed("time (s)" if last else "", f"error ({unit})", ERROR + 28 * last)
-            lower.line(TIME, f"e:{name}", source=self._traces.source, color=BLUE, line_width=1.0)
+            lower.line(
+                TIME, f"e:{name}", source=self._traces.source, color=BLUE, line_width=1.0,
+                nonselection_line_alpha=1.0,
+            )  # fmt: skip
             self._marks(lower, f"e:{name}")
             if not last:
                 lower.xaxis.major_label_text_font_size = "0px"
@@ -196,8 +199,8 @@ class CompareTab:
     def _marks(self, figure: Any, field: str) -> None:
         """Dots that are seen only where a sample is selected."""
         figure.scatter(
-            TIME, field, source=self._traces.source, size=5, color=ORANGE,
-            line_color=None, alpha=0.0, nonselection_alpha=0.0, selection_alpha=0.9,
+            TIME, field, source=self._traces.source, size=4, color=ORANGE,
+            line_color=None, alpha=0.0, nonselection_alpha=0.0, selection_alpha=0.7,
         )  # fmt: skip
 
     def _over_drivers(self, drivers: Any) -> list[Any]:

@@ -6,9 +6,12 @@ the same samples, and what is selected in one picture lights up in all.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
-MOST_POINTS = 4000  # of a picture: a canvas draws a dozen of them well within 0.3 s
+ENDS = np.inf, -np.inf  # in place of NaN, where the smallest and the largest are sought
+MOST_POINTS = 2400  # of a picture: four for each of its pixels across
 
 
 def peaks(rows: np.ndarray, first: int, last: int, most: int = MOST_POINTS) -> np.ndarray:
@@ -22,19 +25,19 @@ def peaks(rows: np.ndarray, first: int, last: int, most: int = MOST_POINTS) -> n
     if count <= most:
         return np.arange(first, max(last, first))
     buckets = max(most // (2 * max(len(rows), 1)), 1)
-    edges = np.linspace(first, last, buckets + 1).astype(int)[:-1]
+    width = -(-count // buckets)
     kept = [np.array([first, last - 1])]
     for row in rows[:, first:last]:
-        kept += [_extremes(row, edges - first, first, sign) for sign in (1.0, -1.0)]
+        whole = np.isfinite(row).all()
+        low, high = (row, row) if whole else (np.where(np.isfinite(row), row, x) for x in ENDS)
+        kept += [_in_buckets(low, width, np.argmin) + first]
+        kept += [_in_buckets(high, width, np.argmax) + first]
     return np.unique(np.concatenate(kept))
 
 
-def _extremes(row: np.ndarray, edges: np.ndarray, first: int, sign: float) -> np.ndarray:
-    """The sample of the smallest value of each bucket, of the largest for a negative sign."""
-    signed = np.where(np.isfinite(row), sign * row, np.inf)
-    least = np.minimum.reduceat(signed, edges)
-    widths = np.diff([*edges, len(row)])
-    candidates = np.flatnonzero(signed == np.repeat(least, widths))
-    buckets = np.searchsorted(edges, candidates, side="right") - 1
-    _, once = np.unique(buckets, return_index=True)
-    return candidates[once] + first
+def _in_buckets(row: np.ndarray, width: int, place: Callable[..., np.ndarray]) -> np.ndarray:
+    """The place in each bucket of so many samples, the last of which may hold fewer."""
+    full = len(row) // width
+    found = place(row[: full * width].reshape(full, width), axis=1) + width * np.arange(full)
+    rest = row[full * width :]
+    return np.append(found, full * width + place(rest, axis=0)) if len(rest) else found

@@ -53,7 +53,9 @@ class Job:
 
     def __init__(self, task: Callable[..., Any], *arguments: Any) -> None:
         self._receiver, sender = prepared().Pipe(duplex=False)
-        self._process = prepared().Process(target=_work, args=(sender, task, arguments))
+        self._process = prepared().Process(
+            target=_work, args=(sender, task, arguments), daemon=True
+        )
         self._process.start()
         sender.close()
         self._begun = time.monotonic()

@@ -52,6 +52,8 @@ BUTTON = f"""
 """
 CHOICE = f"""
 :host {{ font: 14px {FONT}; }}
+.bk-btn-group {{ display: flex; flex-wrap: wrap; }}
+.bk-btn-group .bk-btn {{ flex: 0 0 auto; }}
 .bk-btn {{ font: 14px {FONT}; border: none; border-radius: 0; background: none; color: {SOFT};
            border-bottom: 3px solid transparent; padding: 6px 12px; }}
 .bk-btn.bk-active {{ color: {INK}; font-weight: 600; border: none;
@@ -78,6 +80,12 @@ def text(html: str = "", **more: Any) -> Div:
 def put(place: Div, html: str) -> None:
     """Fill a piece of text; an empty one takes no room."""
     place.update(text=html, visible=bool(html))
+
+
+def wide(table: str) -> str:
+    """A table of a terminal, which is scrolled where it is wider than the page."""
+    style = "white-space: pre; overflow-x: auto; max-width: calc(100vw - 60px)"
+    return f'<pre style="{style}" tabindex="0">{escape(table)}</pre>'
 
 
 def guide(sentence: str) -> Div:

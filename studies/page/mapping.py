@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,7 +11,7 @@ from studies.page import tasks
 from studies.page.look import button, column, row, text
 from studies.page.plausibility import column_names
 from studies.page.replay import Action
-from studies.page.session import Session, mapped, paths, with_opened, with_rig
+from studies.page.session import TIME, Session, mapped, paths, with_opened, with_rig
 from workbench.errors import InputError, whole_file
 from workbench.recording_format import channel_names
 from workbench.units import display_unit
@@ -21,13 +22,17 @@ if TYPE_CHECKING:
     from studies.page.view import Page
 
 ABSENT = "(not recorded)"
+OWN = "_columns"  # behind the name of a rig file that this page writes
 
 
 class Mapping:
-    """A line for each signal: the column of the file, and its unit there."""
+    """A line for each signal: the column of the file, and its unit there.
 
-    def __init__(self, page: Page) -> None:
-        self._page = page
+    The file is the one that is looked at, or else the one whose path is typed.
+    """
+
+    def __init__(self, page: Page, typed: Callable[[], str]) -> None:
+        self._page, self._typed = page, typed
         self._widgets: dict[str, tuple[Any, Any]] = {}
         self._shown: Any = None
 
@@ -57,7 +62,8 @@ class Mapping:
         if session.steps and self._shown != (session.now, path):
             self._shown = (session.now, path)
             stem = Path(session.steps[0].rig_file)
-            self._name.value = str(stem.with_name(f"{stem.stem}_columns.toml"))
+            name = f"{stem.stem.removesuffix(OWN)}{OWN}.toml"
+            self._name.value = str(stem.with_name(name))
             self._fill()
 
     def _fill(self) -> None:
@@ -67,20 +73,26 @@ class Mapping:
         if not self._inner.visible or self._shown is None:
             return
         step, path = self._shown
+        path = path or self._typed()
         known = [str(c.column) for c in step.rig.reader.channels.values()]
         try:
             columns = [*column_names(step.rig, Path(path))] if path else known
         except InputError:
             columns = known
         self._widgets, lines = {}, []
-        for public, full in channel_names(step.rig.plant).items():
-            now = step.rig.reader.channels.get(full)
-            chosen = str(now.column) if now else ABSENT
+        reader = step.rig.reader
+        now = {full: (str(c.column), c.unit) for full, c in reader.channels.items()}
+        signals = {**channel_names(step.rig.plant)}
+        if reader.time.step_s is None:
+            now[TIME] = (str(reader.time.column or TIME), reader.time.unit)
+            signals = {TIME: TIME, **signals}
+        for public, full in signals.items():
+            chosen, typed = now.get(full, (ABSENT, display_unit(full)))
             select = Select(
                 title=public, value=chosen, width=220,
                 options=list(dict.fromkeys([ABSENT, chosen, *columns])),
             )  # fmt: skip
-            unit = TextInput(title="unit", value=now.unit if now else display_unit(full), width=110)
+            unit = TextInput(title="unit", value=typed, width=110)
             self._widgets[full] = (select, unit)
             lines.append(row(select, unit))
         self._lines.children = lines

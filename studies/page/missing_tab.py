@@ -121,7 +121,7 @@ def _bars(rows: tuple[Ranked, ...]) -> Any:
         (-0.19, [each.drop_validation for each in rows], ORANGE, "validation", "/"),
     ):
         source = ColumnDataSource(
-            {"y": places + offset, "x": [100.0 * max(np.nan_to_num(d), 0.0) for d in drops]}
+            data={"y": places + offset, "x": [100.0 * max(np.nan_to_num(d), 0.0) for d in drops]}
         )
         found.hbar(
             "y", 0.36, "x", source=source, color=colour, legend_label=word, hatch_pattern=hatch,

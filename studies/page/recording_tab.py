@@ -26,6 +26,7 @@ from studies.page.session import (
     Session,
     recordings,
     with_opened,
+    with_plant,
     with_rig,
     with_role,
     without_file,
@@ -33,6 +34,7 @@ from studies.page.session import (
 from studies.page.traces import TIME, Traces
 from studies.page.verbs import require_train, with_checked
 from studies.text import labelled
+from workbench.plants import PLANTS
 from workbench.units import display_scale
 
 if TYPE_CHECKING:
@@ -41,6 +43,7 @@ if TYPE_CHECKING:
     from studies.page.view import Page
 
 ENDINGS = (".csv", ".txt", ".dat", ".mat")
+PLANT = "one of the catalogue"
 NONE = "choose here, or type a path"
 SMALL, TALL = 92, 120
 
@@ -61,6 +64,10 @@ class RecordingTab:
 
         page = self._page
         self._rig = TextInput(title="Rig file (TOML)", width=360, name="rig_file")
+        self._plant = Select(
+            title="Or begin with a plant", options=[PLANT, *PLANTS], value=PLANT, width=240
+        )
+        self._plant.on_change("value", self._begin)
         self._file = TextInput(title="Recording (CSV, MAT)", width=360, name="recording_file")
         self._here = Select(
             title="Recordings beside the rig", options=[NONE], value=NONE, width=280
@@ -70,11 +77,12 @@ class RecordingTab:
         self._name = text()
         self._traces = Traces(page.document)
         self._charts = column()
-        self._mapping = Mapping(page)
+        self._mapping = Mapping(page, lambda: self._file.value.strip())
         return column(
             guide("Open a rig and its recordings, look whether they are plausible, and mark which "
                   "one is fitted (training) and which one only judges (validation)."),
             row(self._rig, button("Open rig", self._open_rig, name="open_rig"),
+                self._plant,
                 self._file, button("Add recording", self._add, name="add_recording"), self._here),
             self._files,
             row(button("Check before a fit", self._check, name="check_gate")),
@@ -123,6 +131,11 @@ class RecordingTab:
     def _look(self, path: str) -> None:
         self._looked_at = path
         self.show(self._page.session)
+
+    def _begin(self, _attr: str, _old: str, new: str) -> None:
+        if new != PLANT:
+            self._plant.value = PLANT
+            self._page.attempt(lambda session: with_plant(session, new))
 
     def _open_rig(self) -> None:
         path = self._rig.value.strip()

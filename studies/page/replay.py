@@ -54,6 +54,11 @@ def read_line(rig: str) -> str:
     return f"rig = workbench.load_rig({rig!r})"
 
 
+def begin_lines(rig: str) -> str:
+    """Python that begins with a rig file: no effect is added yet."""
+    return f"{read_line(rig)}\nsteps = []"
+
+
 def recordings_lines(train: Sequence[str], validation: Sequence[str]) -> str:
     """Python that reads the recordings of both sets."""
     return "\n".join(

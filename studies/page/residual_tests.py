@@ -27,8 +27,8 @@ class ResidualTests:
         from bokeh.models import BoxAnnotation, ColumnDataSource
 
         self._sources, self._bands, self._charts = [], [], []
-        for y in ("autocorrelation (-)", "correlation with input (-)"):
-            source = ColumnDataSource({"lag": [], "value": []})
+        for y in ("autocorrelation (-)", "with the input (-)"):
+            source = ColumnDataSource(data={"lag": [], "value": []})
             found = chart("lag (ms)", y, HEIGHT)
             band = BoxAnnotation(bottom=0, top=0, fill_color=SOFT, fill_alpha=0.18)
             found.add_layout(band)

@@ -15,6 +15,7 @@ from urllib.parse import urlsplit
 
 from bokeh.application import Application
 from bokeh.application.handlers.function import FunctionHandler
+from bokeh.resources import Resources
 from bokeh.server.server import BaseServer
 from bokeh.server.tornado import BokehTornado
 from bokeh.server.util import bind_sockets
@@ -37,6 +38,7 @@ NAMES = (ADDRESS, "localhost")
 PORT = 5006
 FORGET_MS = 15_000  # a session without a browser
 LARGEST = 256 * 2**20  # bytes of a message of the browser
+SCRIPTS = "bokeh", "bokeh-widgets"
 REFUSED = "refused: the address of the page holds a token; take it from the terminal\n"
 
 
@@ -65,6 +67,10 @@ class _Guarded(BokehTornado):
             check_unused_sessions_milliseconds=FORGET_MS // 3,
             websocket_max_message_size_bytes=LARGEST,
         )
+
+    def resources(self, absolute_url: str | bool | None = None) -> Resources:
+        """The scripts that the page uses: without formulas, tables and WebGL, 2.3 MB less."""
+        return super().resources(absolute_url).clone(components=list(SCRIPTS))
 
     def find_handler(self, request: HTTPServerRequest, **kwargs: Any) -> Any:
         """The handler of a request; a refusal where it lacks the token or comes from elsewhere."""

@@ -12,16 +12,19 @@ from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from studies.page.replay import Action, read_line, recordings_lines
-from workbench.errors import InputError, Message
+from studies.page.replay import Action, begin_lines, recordings_lines
+from workbench.errors import InputError, Message, whole_file
 from workbench.recording import Recording
 from workbench.recording_format import ChannelFormat
 from workbench.rig import Rig, load_rig
 from workbench.rig_writing import rig_text
 
 if TYPE_CHECKING:
+    from studies.page.control_tasks import Linearised, Looped
     from studies.page.plausibility import Finding
     from studies.page.tasks import Accepted, Compared, Diagnosed, Opened
+
+TIME = "time"  # among the columns of a recording
 
 
 class Role(Enum):
@@ -64,6 +67,10 @@ class Session:
     compared: Compared | None = None
     diagnosed: Diagnosed | None = None
     offered: tuple[str, ...] = ()
+    linearised: Linearised | None = None
+    linearised_before: Linearised | None = None
+    looped: Looped | None = None
+    reported: Path | None = None
     actions: tuple[Action, ...] = ()
 
     @property
@@ -109,8 +116,22 @@ def with_rig(session: Session, path: str) -> Session:
         With all that is wrong with the file.
     """
     step = Step(load_rig(Path(path)), path)
-    done = Action("", read_line(path))
+    done = Action("", begin_lines(path))
     return replace(Session((step,)), actions=(*session.actions, done))
+
+
+def with_plant(session: Session, name: str) -> Session:
+    """A new rig file in this folder, named after a plant of the catalogue; one there is opened."""
+    target = Path(f"{name}.toml")
+    if target.exists():
+        return with_rig(session, str(target))
+    content = f'name = "{name}"\nplant = "{name}"\n'
+    with whole_file(target) as unfinished:
+        unfinished.write_text(content, encoding="utf-8")
+    found = with_rig(session, str(target))
+    write = f"from pathlib import Path\nPath({str(target)!r}).write_text({content!r})\n"
+    last = found.actions[-1]
+    return replace(found, actions=(*found.actions[:-1], Action("", write + last.python)))
 
 
 def with_opened(session: Session, opened: Sequence[Opened], role: Role | None = None) -> Session:
@@ -149,7 +170,7 @@ def did(session: Session, action: Action) -> Session:
 
 
 def mapped(rig: Rig, chosen: Mapping[str, tuple[str, str]]) -> str:
-    """The text of a rig file that reads these columns in these units, by full name.
+    """The text of a rig file that reads these columns in these units, by full name or ``time``.
 
     Raises
     ------
@@ -158,13 +179,17 @@ def mapped(rig: Rig, chosen: Mapping[str, tuple[str, str]]) -> str:
     """
     known = rig.reader.channels
     channels = {}
+    time = rig.reader.time
     for name, (column, unit) in chosen.items():
         before = known.get(name)
         number = column.isdigit() and not rig.reader.header
         noise = before.noise if before and before.unit == unit else None
         place = int(column) if number else column
+        if name == TIME:
+            time = replace(time, column=place, unit=unit)
+            continue
         channels[name] = ChannelFormat(place, unit, noise, before.optional if before else False)
-    found = replace(rig, reader=replace(rig.reader, channels=channels))
+    found = replace(rig, reader=replace(rig.reader, time=time, channels=channels))
     content = rig_text(found, Path.cwd())
     load_rig(content)
     return content

@@ -23,7 +23,7 @@ class Traces:
         from bokeh.models import ColumnDataSource, Range1d
 
         self._document = document
-        self.source = ColumnDataSource({TIME: [], SAMPLE: []})
+        self.source = ColumnDataSource(data={TIME: [], SAMPLE: []})
         self.range = Range1d(0.0, 1.0)
         self.rows: dict[str, np.ndarray] = {TIME: np.zeros(0)}
         self.selected = np.zeros(0, dtype=bool)

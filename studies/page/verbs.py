@@ -109,7 +109,8 @@ def add_action(session: Session, name: str) -> Action:
     what = [name] if pair or not place else [effect, "--at", place]
     words = command("add", session.now.rig_file, *what, "--fit", *train, *_sets(session), "-o", out)
     lines = (
-        f"rig = workbench.add(rig, {name!r}, train, validation).rig",
+        f"steps.append(workbench.add(rig, {name!r}, train, validation))",
+        "rig = steps[-1].rig",
         f"workbench.write_rig(rig, {out!r})",
     )
     return Action(words, "\n".join(lines))
@@ -120,7 +121,8 @@ def fit_action(session: Session) -> Action:
     train, out = paths(session.of(Role.TRAINING)), step_file(session)
     words = command("fit", session.now.rig_file, *train, *_sets(session), "-o", out)
     lines = (
-        "rig = workbench.fit(rig, train, validation).rig",
+        "steps.append(workbench.fit(rig, train, validation))",
+        "rig = steps[-1].rig",
         f"workbench.write_rig(rig, {out!r})",
     )
     return Action(words, "\n".join(lines))
@@ -129,15 +131,28 @@ def fit_action(session: Session) -> Action:
 def with_accepted(session: Session, found: Accepted, action: Action) -> Session:
     """The rig with an effect added, or fitted."""
     step = Step(found.rig, step_file(session), found)
-    done = replace(session, steps=(*session.steps, step), compared=None, diagnosed=None)
-    return did(done, action)
+    return did(_about(session, (*session.steps, step)), action)
 
 
 def back_to(session: Session, number: int) -> Session:
     """The rig as it was after so many steps."""
     steps = session.steps[: number + 1]
-    found = replace(session, steps=steps, compared=None, diagnosed=None, checked=None)
-    return did(found, Action("", read_line(steps[-1].rig_file)))
+    lines = (read_line(steps[-1].rig_file), f"del steps[{number}:]")
+    return did(_about(session, steps), Action("", "\n".join(lines)))
+
+
+def _about(session: Session, steps: tuple[Step, ...]) -> Session:
+    """The session about another rig: what was found of the one before it goes away."""
+    return replace(
+        session,
+        steps=steps,
+        checked=None,
+        compared=None,
+        diagnosed=None,
+        linearised=None,
+        linearised_before=None,
+        looped=None,
+    )
 
 
 def save(session: Session, path: str) -> Session:

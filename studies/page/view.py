@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from bokeh.models import Model
 
 POLL_MS = 200
+SHOWN = 240  # letters of a line of Python
 COPY = "navigator.clipboard.writeText(said.text)"
 
 Change = Callable[[Session], Session]
@@ -55,9 +56,13 @@ class Page:
 
         self._head, self._status = text(), text(visible=True)
         self._cancel = button("Cancel", self.cancel, visible=False, name="cancel")
-        labels = [f"{k}  {tab.title}" for k, tab in enumerate(self._tabs, start=1)]
+        labels = [f"{k} {tab.title}" for k, tab in enumerate(self._tabs, start=1)]
         self._choice = RadioButtonGroup(
-            labels=labels, active=0, stylesheets=[sheet(CHOICE)], name="tabs"
+            labels=labels,
+            active=0,
+            stylesheets=[sheet(CHOICE)],
+            name="tabs",
+            sizing_mode="stretch_width",
         )
         self._choice.on_change("active", lambda _a, _o, _n: self.refresh())
         self._panels = [column() for _ in self._tabs]
@@ -182,7 +187,9 @@ class Page:
         """The action as a command line and as Python, to be copied."""
         self._command.text, self._python.text = action.command, action.python
         said = f"<pre>$ {escape(action.command)}</pre>" if action.command else ""
-        python = "".join(f"<pre>&gt;&gt;&gt; {escape(x)}</pre>" for x in action.python.split("\n"))
+        python = "".join(
+            f"<pre>&gt;&gt;&gt; {escape(_short(x))}</pre>" for x in action.python.split("\n")
+        )
         kept = f'<p class="guide">all actions as a script: {self._replay}</p>'
         put(self._done, said + python + (kept if self._replay.exists() else ""))
 
@@ -198,3 +205,8 @@ class Page:
         if self._shown.get(active) is not self.session:
             self._shown[active] = self.session
             self._tabs[active].show(self.session)
+
+
+def _short(line: str) -> str:
+    """A line as far as it tells something; what is copied is whole."""
+    return line if len(line) <= SHOWN else f"{line[:SHOWN]} ..."

@@ -111,22 +111,24 @@ def _table(levels: tuple[float, ...], told: dict[str, list[Answer]]) -> str:
     return columns(("V (* not fitted)", *head), rows).replace("nan", "  -")
 
 
+def _true_friction(rigs: list[true.CrrRig]) -> np.ndarray:
+    """Coulomb friction and excess of the static one in N, viscous in N s/m: mean of the rigs."""
+    return np.mean([(r.coulomb_n, r.stiction_excess_n, r.viscous_n_s_m) for r in rigs], axis=0)
+
+
 def _found(found: Friction, rigs: list[true.CrrRig]) -> Iterator[Finding]:
     coulomb, viscous = found.line
-    own = {
-        key: float(np.mean([getattr(rig, key) for rig in rigs]))
-        for key in ("coulomb_n", "stiction_excess_n", "viscous_n_s_m")
-    }
-    static = own["coulomb_n"] + own["stiction_excess_n"]
+    coulomb_n, excess_n, true_viscous = _true_friction(rigs)
+    static = coulomb_n + excess_n
     why = (
         f"the truth has {static:.1f} N, drawn around the printed value, and along the stroke 5 to "
         "10 % more or less; the tanh keeps the peak below F_S (E000-10)"
     )
     yield Finding("S000-3", "F_S", "20 N", f"{found.static_n:.1f} N", why)
     yield Finding("S000-3", "F_C", "13.3 N", f"{coulomb:.1f} N",
-                  f"the truth has {own['coulomb_n']:.1f} N")  # fmt: skip
+                  f"the truth has {coulomb_n:.1f} N")  # fmt: skip
     why = (
-        f"the truth has {own['viscous_n_s_m']:.1f} N s/m; the paper's SI value of 4.4 kg/s "
+        f"the truth has {true_viscous:.1f} N s/m; the paper's SI value of 4.4 kg/s "
         "contradicts its inch value, 0.5 lbf s/in (E000-1)"
     )
     yield Finding("S000-3", "C_v", "4.4 kg/s or 87.6 N s/m", f"{viscous:.1f} N s/m", why)
@@ -177,11 +179,11 @@ def _off(levels: tuple[float, ...], told: dict[str, list[Answer]]) -> tuple[floa
 
 def _claims(found: Friction, rigs: list[true.CrrRig]) -> Iterator[Claim]:
     coulomb, viscous = found.line
-    rig = rigs[0]
+    coulomb_n, excess_n, true_viscous = _true_friction(rigs)
     pairs = {
-        "F_S": (found.static_n, rig.coulomb_n + rig.stiction_excess_n),
-        "F_C": (coulomb, rig.coulomb_n),
-        "C_v": (viscous, rig.viscous_n_s_m),
+        "F_S": (found.static_n, coulomb_n + excess_n),
+        "F_C": (coulomb, coulomb_n),
+        "C_v": (viscous, true_viscous),
     }
     off = {name: value / real - 1 for name, (value, real) in pairs.items()}
     line = max(abs(off["F_C"]), abs(off["C_v"]))

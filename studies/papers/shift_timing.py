@@ -255,7 +255,8 @@ def _claims(
     yield Claim(claim, told, bool((ours_percent <= printed).all()))
     opens = 1e3 * early["rises_s"]
     told = f"{np.median(opens):+.1f} ms early, {np.mean(opens > 0):.0%} of the shifts"
-    yield Claim("S003-2: the model's valve opens too early", told, np.mean(opens > 0) > 0.9)
+    claim = "S003-2: the model's valve opens too early, in the median over rigs and shifts"
+    yield Claim(claim, told, np.median(opens) > 0.1)
     moves = 1e3 * early["leaves_s"]
     claim = "S003-2: and yet its piston starts no earlier than the rigs', in the median"
     yield Claim(claim, f"{-np.median(moves):.2f} ms late", np.median(moves) <= 0.0)

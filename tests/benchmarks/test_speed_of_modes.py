@@ -12,7 +12,13 @@ import pytest
 
 from linearize.modes import Interval, hybrid_modes
 from linearize.shift_modes import gearbox_modes
-from linearize.standard import POSITION, servo_drive_cuts, servo_drive_point, standard_modes
+from linearize.standard import (
+    POSITION,
+    regime_modes,
+    servo_drive_cuts,
+    servo_drive_point,
+    standard_modes,
+)
 from workbench.plants.crr_leg import crr_leg
 from workbench.plants.crr_rig import crr_rig
 from workbench.plants.gearbox import gearbox
@@ -42,8 +48,15 @@ def leg_modes():
     return standard_modes(crr_leg())
 
 
+def leg_regimes():
+    """1728 modes: the same with the valve of what sticks, and the stops; 27 sets of held joints."""
+    return regime_modes(crr_leg())
+
+
 @pytest.mark.benchmark(timer=time.process_time)
-@pytest.mark.parametrize("make", [servo_drive_modes, gearbox_many, rig_modes, leg_modes])
+@pytest.mark.parametrize(
+    "make", [servo_drive_modes, gearbox_many, rig_modes, leg_modes, leg_regimes]
+)
 def test_a_hundred_modes(benchmark, make):
     hybrid = benchmark.pedantic(make, rounds=3)
     start = time.process_time()

@@ -41,7 +41,7 @@ class Finding:
     @property
     def message(self) -> Message:
         """As an error names it."""
-        return Message(self.what, self.channel, self.remedy, file=self.recording)
+        return Message(f"{self.what}; {self.remedy}", self.channel, file=self.recording)
 
     def __str__(self) -> str:
         return f"{self.recording}: {self.channel}: {self.what}; {self.remedy}"

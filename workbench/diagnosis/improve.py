@@ -39,6 +39,7 @@ from workbench.rig import Rig
 __all__ = ["Addition", "Improvement", "accept", "add", "add_law", "improve"]
 
 MOST_ROUNDS = 8
+LESS = 0.98  # of the error that is left: a fit that leaves no less is no step of its own
 
 
 @dataclass(frozen=True)
@@ -215,7 +216,9 @@ def _improvement(
     if done.law:
         final, fit, held_out = done.steps[-1].rig, done.law.fit or fit, done.law.validation
     elif done.kept and done.kept.steps:
-        fit, held_out = done.kept.fit, done.kept.validation
+        fit, held_out = _last_fit(done, done.kept)
+        if fit is not done.kept.fit:
+            done = done.marked("all of it", fit, held_out, Change.FITTED)
         final = fitted_rig(assembled(done.rig, done.kept.steps), fit)
     if final is not done.rig:
         parameters = tuple(_counted_from(done.rig, row) for row in moved_parameters(fit))
@@ -243,6 +246,22 @@ def _improvement(
         fit=fit,
         validation_fit=held_out,
     )
+
+
+def _last_fit(done: _Rounds, kept: Kept) -> tuple[Fit, Fit | None]:
+    """The fit of what is kept: that of the last diagnosis where it leaves less on both sets.
+
+    A refit weighs errors as the model without its effect made them, and where that effect was large
+    it ends before what is left counts for anything.  The diagnosis that then found nothing to add
+    had fitted the same model, weighed by its own errors.
+    """
+    last, found = done.diagnoses[-1], (kept.fit, kept.validation)
+    added = last.ranking and last.ranking[0].accepted  # after that fit
+    if added or [s.candidate for s in kept.steps] != [s.candidate for s in done.steps]:
+        return found
+    again = (last.base, last.base_validation)
+    less = (per_sample(b) < LESS * per_sample(a) for a, b in zip(found, again, strict=True))
+    return again if all(less) else found
 
 
 def _counted_from(rig: Rig, row: Moved) -> Moved:

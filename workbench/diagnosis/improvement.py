@@ -23,6 +23,7 @@ class Change(Enum):
     DROPPED = "dropped"
     SWAPPED = "swapped"
     LAW = "empirical"
+    FITTED = "fitted again"
 
 
 class Stage(NamedTuple):

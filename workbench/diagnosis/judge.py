@@ -44,6 +44,9 @@ CLOSE_DROP = 0.25  # of the leader's drop: within it the order is not to be trus
 CERTAIN_SHARE = 0.75  # an accepted candidate above it needs no comparison with a law
 CLEARLY_LESS = 0.20  # of the held-out misfit that is left
 CLOSE_DROP_SAME = 0.50  # the same for signatures that are one
+FAR_WORSE = 3.0  # times the held-out misfit that is left: beyond, that recording tells them apart
+LITTLE_LEFT = 0.05  # of the held-out misfit: less is not compared
+LEAST_PROXY = 0.05  # of the misfit: less stands for nothing
 
 HELD_OUT_REASON = "does not predict the held-out recording better"
 SHARE_REASON = f"explains less than {LEAST_SHARE:.0%} of the misfit"
@@ -140,11 +143,11 @@ def tie_group(base: Fit, refits: list[Refit], profiles: dict[str, Profile]) -> l
 
     A candidate is tied when its drop comes within a quarter of the best, or within half of it with
     a signature in the same direction: then only the nuisances decide between the two, and on the
-    held-out recording too.  Among the tied those that pass every criterion come first, effects
-    before parameters that would lie far off what is known of them, and among these the held-out
-    recording decides where it does so clearly: the one that leaves at least a fifth less of the
-    misfit there leads.  Those that look most like the leader stand next to it: were it wrong, it
-    would stand for one of them.
+    held-out recording too, unless one leaves several times as much there.  Among the tied those
+    that pass every criterion come first, effects before parameters that would lie far off what is
+    known of them, and among these the held-out recording decides where it does so clearly: the one
+    that leaves at least a fifth less of the misfit there leads.  Those that look most like the
+    leader stand next to it: were it wrong, it would stand for one of them.
     """
     best = refits[0]
     tied = [best]
@@ -152,6 +155,8 @@ def tie_group(base: Fit, refits: list[Refit], profiles: dict[str, Profile]) -> l
         gap = (best.drop_train - other.drop_train) / max(best.drop_train, 1e-12)
         same = abs(_alignment_of(best, other, profiles)) > SAME_DIRECTION
         if predicts(best) and not predicts(other) and not same:
+            continue
+        if left_held_out(other) > FAR_WORSE * max(left_held_out(best), LITTLE_LEFT):
             continue
         if gap < (CLOSE_DROP_SAME if same else CLOSE_DROP):
             tied.append(other)

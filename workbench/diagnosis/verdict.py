@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from workbench.diagnosis.judge import SHARE_REASON
+from workbench.diagnosis.judge import LEAST_PROXY, SHARE_REASON, share_removed
 from workbench.diagnosis.power import too_weak
 from workbench.diagnosis.result import NAMING, Evidence, Law, Ranked, Verdict, told
 from workbench.diagnosis.scan import WIDER, Profile
@@ -20,8 +20,9 @@ def judged(
 ) -> Verdict:
     """The verdict; ``held_out`` is False where there is no true validation recording.
 
-    A recording that could show few effects of the catalogue says little by showing none, unless
-    what hides them are errors ``far`` above the noise: then something is there.
+    What explains next to nothing stands for nothing.  A recording that could show few effects of
+    the catalogue says little by showing none, unless what hides them are errors ``far`` above the
+    noise: then something is there.
     """
     if law:
         return Verdict.NOT_IN_CATALOGUE
@@ -32,7 +33,7 @@ def judged(
         return Verdict.TIE if leader.tied_with or not held_out else Verdict.FOUND
     if too_weak(ranking) and not far:
         return Verdict.RECORDING_TOO_WEAK
-    if leader and leader.reasons == (SHARE_REASON,):
+    if leader and leader.reasons == (SHARE_REASON,) and share_removed(leader) > LEAST_PROXY:
         return Verdict.SMALL_PROXY
     return Verdict.NOTHING_MISSING
 

@@ -1,0 +1,75 @@
+"""The report of what a page, or its replay script, has found."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+from studies.checking import styled_figures
+from studies.figures.comparison import comparison_figures
+from studies.figures.diagnosis import diagnosis_figures
+from studies.figures.improvement import before_after_figure
+from studies.figures.style import save_all
+from studies.report.page import FIGURES, Section, write_report
+from studies.text_of_comparison import comparison_text
+from studies.text_of_results import before_after_text, moved_text, ranking_text, unit_names
+
+if TYPE_CHECKING:
+    from studies.closed_loop_check import Check
+    from studies.shift_check import ShiftCheck
+    from workbench.comparison.compare import Comparison
+    from workbench.diagnosis.result import Diagnosis
+    from workbench.fitting.errors import Errors
+    from workbench.rig import Rig
+
+
+class Accepted(Protocol):
+    """What both an addition and a fit have."""
+
+    rig: Rig
+    before: Errors
+    after: Errors
+
+
+@dataclass(frozen=True)
+class Found:
+    """What there is to report; what is None or empty was not done."""
+
+    comparison: Comparison | None = field(default=None, repr=False)
+    diagnosis: Diagnosis | Any = field(default=None, repr=False)
+    steps: Sequence[Accepted] = ()
+    check: Check | ShiftCheck | None = field(default=None, repr=False)
+
+
+def report(
+    folder: Path, command: str, name: str, found: Found, say: Callable[[str], None] = print
+) -> Path:
+    """Figures and one HTML file of what was found; gives its path."""
+    say("drawing")
+    sections: list[Section] = []
+
+    def tell(title: str, text: str, table: str, figures: dict[str, Any]) -> None:
+        save_all(figures, folder / FIGURES, command)
+        sections.append(Section(title, (text,) if text else (), table, (*figures,)))
+
+    if found.comparison:
+        figures = comparison_figures(found.comparison)
+        tell("The plant against its recordings", "", comparison_text(found.comparison), figures)
+    if found.diagnosis:
+        each = found.diagnosis
+        tell("Which effect is missing", each.sentence, ranking_text(each), diagnosis_figures(each))
+    for number, step in enumerate(found.steps, start=1):
+        units = unit_names(step.rig.plant.measured)
+        parameters = getattr(step, "parameters", ())
+        table = before_after_text(step.before, step.after, units)
+        table += f"\n\n{moved_text(parameters)}" if parameters else ""
+        drawn = {f"step_{number}": before_after_figure(step.before, step.after, units)}
+        note = step.rig.notes[-1] if step.rig.notes else ""
+        tell(f"Step {number}", note, table, drawn)
+    if found.check:
+        tell("Closed loops", "", found.check.text, styled_figures(found.check))
+    if not sections:
+        sections.append(Section("Nothing was done yet"))
+    return write_report(folder, f"What was found of {name}", command, sections)

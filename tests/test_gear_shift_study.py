@@ -1,0 +1,69 @@
+"""What the study of gear shifts claims of drawn plants, on numbers that are given."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from studies.gear_shift_study import (
+    HYBRID,
+    LQ,
+    PD,
+    SCHEDULED,
+    _claims_of_draws,
+    _missed,
+    ranking,
+)
+from studies.shift_check import SHIFTS, Shift
+
+TIMES_S = {HYBRID: 0.02, SCHEDULED: 0.03, LQ: 0.035, PD: 0.05}
+
+
+def shift(design, scenario, settling_s):
+    """A shift within its bounds but for its time, which may be 25 ms."""
+    numbers = dict.fromkeys(Shift.__dataclass_fields__, 0.0) | {"longest_s": 0.025}
+    numbers |= {"design": design, "scenario": scenario, "settling_s": settling_s}
+    return Shift(**numbers)
+
+
+def rows(number=2, **other):
+    """All four shifts of every design on so many draws."""
+    times = TIMES_S | other
+    return [
+        shift(f"{design} {k + 1}", scenario, time_s)
+        for k in range(number)
+        for scenario in SHIFTS
+        for design, time_s in times.items()
+    ]
+
+
+def held(found):
+    return {claim.claim: (claim.holds, claim.found) for claim in _claims_of_draws(found)}
+
+
+def test_the_order_of_the_published_follow_ups_is_looked_for_on_every_draw():
+    order = "on drawn plants too: scheduled, then LQ, then PD"
+    swapped = rows(2)
+    late = next(k for k, row in enumerate(swapped) if row.design == f"{SCHEDULED} 2")
+    swapped[late] = replace(swapped[late], settling_s=0.2)
+
+    assert held(rows())[order][0]
+    assert held(rows())[order][1].endswith("the order holds on 2 of 2")
+    holds, told = held(swapped)[order]
+    assert not holds and told.endswith("the order holds on 1 of 2")
+
+
+def test_a_shift_that_never_ends_makes_its_design_the_last_one():
+    found = ranking(rows(1, **{LQ: np.inf}))
+
+    assert found[SCHEDULED] == [pytest.approx(0.12)] and found[LQ] == [np.inf]
+
+
+def test_what_rivals_miss_is_no_miss_of_hybrid_mpc():
+    claims = held(rows())
+
+    assert all(
+        claims[f"{HYBRID}: {name} is fast and soft on every drawn plant"][0] for name in SHIFTS
+    )
+    assert _missed(rows()) == "none"
+    assert "hybrid MPC 2" in _missed(rows(**{HYBRID: 0.03}))

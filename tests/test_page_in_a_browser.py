@@ -1,0 +1,248 @@
+"""The page in a real browser, headless: the loop on the demo recordings with their hidden effect.
+
+WORKBENCH_SCREENSHOTS names a folder that keeps the screenshots.
+"""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from page_files import drive_files
+
+from studies.demo import DATA
+from workbench.rig import load_rig
+
+CHROMIUM = "/usr/bin/chromium"
+FLAGS = [
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+LONG_MS = 900_000  # of a diagnosis on a busy machine
+ROOT = Path(__file__).parent.parent
+
+pytest.importorskip("bokeh", reason="the page needs bokeh (extra `page`)")
+playwright = pytest.importorskip("playwright.sync_api", reason="playwright drives the browser")
+pytestmark = pytest.mark.skipif(
+    not Path(CHROMIUM).exists(), reason=f"no {CHROMIUM}: `apt-get install chromium`"
+)
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with playwright.sync_playwright() as started:
+        found = started.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        yield found
+        found.close()
+
+
+class Served:
+    """A running page, and browser tabs on it."""
+
+    def __init__(self, browser, folder, *files):
+        self.browser, self.folder = browser, folder
+        self.asked = []
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "studies.command_line", "app", *files],
+            cwd=folder, stdout=subprocess.PIPE, text=True,
+            env={**os.environ, "PYTHONPATH": str(ROOT)},
+        )  # fmt: skip
+        self.address = self.process.stdout.readline().split()[-1]
+
+    def tab(self, width=1280, height=800, scale=1.0):
+        size = {"width": round(width / scale), "height": round(height / scale)}
+        found = self.browser.new_page(viewport=size, device_scale_factor=scale)
+        found.set_default_timeout(120_000)
+        found.on("request", lambda request: self.asked.append(request.url))
+        found.goto(self.address)
+        return found
+
+    def shot(self, page, name):
+        folder = Path(os.environ.get("WORKBENCH_SCREENSHOTS", self.folder))
+        page.wait_for_timeout(700)
+        page.screenshot(path=folder / f"{name}.png", full_page=True)
+        assert (folder / f"{name}.png").stat().st_size > 20_000
+
+    def children(self):
+        """Processes that the server started, by command."""
+        listed = subprocess.run(
+            ["ps", "-eo", "pid,ppid,args"], capture_output=True, text=True, check=True
+        ).stdout.splitlines()
+        return [line for line in listed if "forkserver" in line]
+
+    def close(self):
+        self.process.send_signal(signal.SIGINT)
+        assert self.process.wait(30) == 0
+
+
+@pytest.fixture
+def served(browser, tmp_path):
+    started = []
+
+    def start(folder, *files):
+        started.append(Served(browser, folder, *files))
+        return started[-1]
+
+    yield start
+    for each in started:
+        each.close()
+
+
+def click(page, label):
+    page.get_by_role("button", name=label, exact=True).last.click()
+
+
+def drag(page, x, y, far):
+    """Draw a box to the right as slowly as a hand does."""
+    page.mouse.move(x, y)
+    page.wait_for_timeout(200)
+    page.mouse.down()
+    for k in range(1, 9):
+        page.mouse.move(x + far * k / 8, y + 3 * k)
+        page.wait_for_timeout(50)
+    page.mouse.up()
+
+
+def no_wider_than_the_window(page):
+    return page.evaluate("document.documentElement.scrollWidth <= window.innerWidth + 1")
+
+
+def test_a_wrong_file_is_told_on_the_page_and_two_tabs_do_not_mix(served, tmp_path):
+    page_of = served(drive_files(tmp_path), "rig.toml", "train.csv", "validation.csv")
+    page, other = page_of.tab(), page_of.tab()
+    page.wait_for_selector("text=Plausible?")
+    other.wait_for_selector("text=Plausible?")
+
+    page.get_by_label("Rig file (TOML)").fill("nowhere.toml")
+    click(page, "Open rig")
+    page.wait_for_selector("text=nowhere.toml: there is no such file")
+    page.get_by_label("validation.csv is for").select_option("not used")
+    page.wait_for_selector("text=validation = [workbench.read_recording(rig, path) for path in []]")
+
+    assert other.get_by_label("validation.csv is for").input_value() == "validation"
+    page_of.shot(page, "wrong_file")
+    assert {url.split("/")[2] for url in page_of.asked} == {page_of.address.split("/")[2]}
+
+
+@pytest.mark.slow
+def test_a_box_drawn_with_the_mouse_lights_samples_up(served, tmp_path):
+    page_of = served(drive_files(tmp_path), "rig.toml", "train.csv")
+    page = page_of.tab()
+    page.wait_for_selector("text=Plausible?")
+    click(page, "2 Compare")
+    click(page, "Compare")
+    page.wait_for_selector("text=Errors of train")
+    page.wait_for_timeout(1000)
+
+    canvas = page.locator("canvas:visible").first
+    canvas.scroll_into_view_if_needed()
+    box = canvas.bounding_box()
+    drag(page, box["x"] + 160, box["y"] + 40, 140)
+
+    page.wait_for_selector("text=samples lit")
+    page_of.shot(page, "brushed")
+
+
+@pytest.mark.slow
+def test_the_loop_on_the_demo_recording_from_files_to_a_saved_rig(served, tmp_path):
+    for name in ("rig.toml", "train.csv", "validation.csv"):
+        shutil.copy(DATA / name, tmp_path)
+    page_of = served(tmp_path, "rig.toml", "train.csv", "validation.csv")
+    page = page_of.tab()
+    page.set_default_timeout(LONG_MS)
+    page.wait_for_selector("text=Plausible?")
+    click(page, "Check before a fit")
+    page.wait_for_selector("text=uncertain parameters")
+    page_of.shot(page, "1_recording")
+
+    click(page, "2 Compare")
+    click(page, "Compare")
+    page.wait_for_selector("text=Errors of train")
+    page_of.shot(page, "2_compare")
+
+    click(page, "3 Missing effect")
+    click(page, "Diagnose")
+    page.wait_for_selector("text=is missing: it removes")
+    named = page.get_by_text("is missing: it removes").inner_text().split()[0]
+    page_of.shot(page, "3_missing_effect")
+
+    click(page, "4 Add and fit")
+    page.get_by_label(named, exact=True).check()
+    page.wait_for_selector("text=What moved")
+    page_of.shot(page, "4_add_and_fit")
+    rows = page.locator("table").filter(has_text="RMSE before").locator("tr").all_inner_texts()
+    fits = [row.split("\t") for row in rows if row.startswith("validation")]
+    assert len(fits) == 3
+    assert all(float(row[5]) > float(row[4]) for row in fits), fits
+
+    page.get_by_label("Rig file to save").fill("better.toml")
+    click(page, "Save rig")
+    page.wait_for_selector("text=workbench.write_rig(rig, 'better.toml')")
+    assert named in load_rig(tmp_path / "better.toml").added
+    page.get_by_label(f"1. {named}", exact=True).uncheck()
+    page.get_by_text("What moved").wait_for(state="hidden")
+
+    page.reload()
+    page.get_by_label("Rig file (TOML)").fill("better.toml")
+    click(page, "Open rig")
+    page.wait_for_selector("text=rig = workbench.load_rig('better.toml')")
+    assert list(tmp_path.glob("workbench_replay_*.py"))
+
+
+@pytest.mark.slow
+def test_a_browser_that_closes_in_the_middle_of_a_fit_leaves_the_server_well(served, tmp_path):
+    page_of = served(drive_files(tmp_path, seconds=3.0), "rig.toml", "train.csv")
+    page = page_of.tab()
+    page.wait_for_selector("text=Plausible?")
+    idle = len(page_of.children())
+    click(page, "3 Missing effect")
+    click(page, "Diagnose")
+    page.wait_for_selector("text=prior fit")
+    assert len(page_of.children()) > idle
+    page.close()
+
+    again = page_of.tab()
+    again.wait_for_selector("text=Plausible?")
+    for _ in range(90):
+        if len(page_of.children()) <= idle:
+            break
+        again.wait_for_timeout(500)
+
+    assert len(page_of.children()) <= idle
+    click(again, "3 Missing effect")
+    click(again, "Diagnose")
+    again.wait_for_selector("text=prior fit")
+    click(again, "Cancel")
+    again.wait_for_selector("text=cancelled; nothing was changed")
+
+
+@pytest.mark.slow
+def test_the_page_is_used_by_keyboard_and_read_at_two_sizes(served, tmp_path):
+    page_of = served(drive_files(tmp_path), "rig.toml", "train.csv")
+    for name, scale in (("1280", 1.0), ("zoomed", 2.0)):
+        page = page_of.tab(scale=scale)
+        page.wait_for_selector("text=Plausible?")
+        assert no_wider_than_the_window(page)
+        page_of.shot(page, f"size_{name}")
+
+    reached = set()
+    for _ in range(40):
+        page.keyboard.press("Tab")
+        reached.add(
+            page.evaluate(
+                """() => { let e = document.activeElement;
+                    while (e.shadowRoot && e.shadowRoot.activeElement)
+                        e = e.shadowRoot.activeElement;
+                    return e.innerText || e.id || e.tagName; }"""
+            ).strip()
+        )
+    assert {"2 Compare", "Open rig", "Add recording", "Check before a fit"} <= reached, reached

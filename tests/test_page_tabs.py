@@ -1,0 +1,137 @@
+"""The tabs of the page without a browser: what they show of a session, and how they act on it."""
+
+import numpy as np
+import pytest
+from page_files import drive_files
+
+pytest.importorskip("bokeh", reason="the page needs bokeh (extra `page`)")
+
+from bokeh.document import Document
+
+from linearize.standard import standard_modes
+from studies.cuts_file import modes_by_cuts
+from studies.page import tasks
+from studies.page.mode_cuts import boundaries, cuts_of, cuts_text, moved
+from studies.page.pages import TABS, all_tabs
+from studies.page.session import Role, Session, recordings, with_opened, with_rig, with_role
+from studies.page.verbs import with_compared
+from studies.page.view import Page
+from workbench.rig import default_rig
+
+
+def quiet(_):
+    pass
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return drive_files(tmp_path_factory.mktemp("tabs"))
+
+
+@pytest.fixture(scope="module")
+def compared(folder):
+    """A session with one recording that was compared."""
+    begun = with_rig(Session(), str(folder / "rig.toml"))
+    opened = tasks.open_recordings(begun.now.rig, (str(folder / "train.csv"),), quiet)
+    session = with_opened(begun, opened)
+    return with_compared(session, tasks.compare(session.now.rig, recordings(session.used), quiet))
+
+
+@pytest.fixture
+def page(tmp_path, monkeypatch, compared):
+    """A page on a session; its replay script goes into a folder of its own."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(Document, "add_timeout_callback", lambda _self, act, _ms: act())
+    found = Page(Document(), all_tabs)
+    found.become(compared)
+    return found
+
+
+def look_at(page, name):
+    titles = [tab.title for tab in page._tabs]
+    page._choice.active = titles.index(name)
+    return page._tabs[titles.index(name)]
+
+
+def test_every_tab_shows_a_session_with_and_without_results(page):
+    for tab in TABS:
+        look_at(page, tab.title)
+    page.become(Session())
+    for tab in TABS:
+        look_at(page, tab.title)
+
+
+def test_a_box_in_one_picture_lights_the_same_samples_in_all(page):
+    tab = look_at(page, "Compare")
+    rows = tab._traces.rows
+    worst = np.nanargmax(np.abs(rows["e:slide.position_m"]))
+    box = {"x0": rows["d:0"][worst] - 1, "x1": rows["d:0"][worst] + 1, "y0": -1e9, "y1": 1e9}
+
+    tab._choose("d:0", "residual", box)
+
+    lit = tab._traces.selected
+    assert lit[worst] and 0 < lit.sum() < len(lit)
+    sent = np.asarray(tab._traces.source.data["sample"])[tab._traces.source.selected.indices]
+    assert np.array_equal(np.flatnonzero(lit), np.sort(sent))  # nothing is thinned in so short one
+    assert "samples lit" in tab._lit.text
+    tab._clear()
+    assert not tab._traces.source.selected.indices
+
+
+def test_a_zoom_sends_the_samples_of_the_window_and_keeps_what_is_lit(page):
+    traces = look_at(page, "Compare")._traces
+    traces.select(traces.rows["time"] > 0.5)
+
+    traces.range.update(start=0.4, end=0.6)
+
+    time = np.asarray(traces.source.data["time"])
+    assert time.min() >= 0.399 - 1e-9 and time.max() <= 0.601 + 1e-9
+    lit = time[traces.source.selected.indices]
+    assert lit.min() > 0.5 and len(lit) > 90
+
+
+def test_errors_are_told_by_signal_horizon_and_regime(page, compared):
+    tab = look_at(page, "Compare")
+
+    for word in ("one step", "window", "free run", "slide.position", "fit %"):
+        assert word in tab._errors.text
+    assert "at rest" in tab._regimes.text or "moving forward" in tab._regimes.text
+    shares = [each.share_of_error for each in compared.compared.regimes[0]["window"]]
+    assert shares == sorted(shares, reverse=True) and min(shares) >= 0.0 and max(shares) <= 1.0
+
+
+def test_what_is_wrong_is_said_on_the_page_and_changes_nothing(page):
+    before = page.session
+
+    page.attempt(lambda session: with_rig(session, "nowhere.toml"))
+
+    assert "nowhere.toml: there is no such file" in page._status.text
+    assert page.session is before
+
+
+def test_two_pages_do_not_mix(page, compared):
+    other = Page(Document(), all_tabs)
+    other.become(compared)
+
+    page.attempt(lambda s: with_role(s, s.files[0].opened.path, Role.ASIDE))
+
+    assert page.session is not compared and other.session is compared
+    assert page._replay != other._replay
+
+
+def test_cuts_of_standard_modes_are_a_file_that_gives_them_again_and_move(tmp_path):
+    plant = default_rig("servo_drive").plant
+    cuts = cuts_of(standard_modes(plant))
+    ends = [each for each in boundaries(cuts) if each.signal == "slide.position_m"]
+    further = moved(cuts, [(ends[0], 0.11)])
+    (tmp_path / "cuts.toml").write_text(cuts_text(further))
+
+    found = cuts_of(modes_by_cuts(plant, tmp_path / "cuts.toml"))
+
+    assert found == further
+    assert found["slide.position_m"][0].upper == pytest.approx(0.11)
+    assert found["valve.command_v"] == cuts["valve.command_v"]
+
+
+def test_modes_that_are_no_product_of_intervals_have_no_cuts_to_move():
+    assert cuts_of(standard_modes(default_rig("crr_rig").plant)) == {}
