@@ -124,10 +124,7 @@ def close_loops(
     path = Path(target)
     write_design(found, path)
     shifts = rig.plant.name in SHIFT_MODES
-    if shifts:
-        told = search_text(found.controller)
-    else:
-        told = _certified(found, say)
+    told = search_text(found.controller) if shifts else _certified(found, say)
     observers = () if shifts else estimators
     loops = loops_of(rig, {path: path.read_text(encoding="utf-8")}, observers, scenarios)
     checked = recorded_runs(loops, runs, say)
