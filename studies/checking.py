@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from math import isclose
 from pathlib import Path
@@ -89,6 +89,13 @@ class Loops:
         )
 
 
+def scenarios_of(plant: Plant) -> tuple[str, ...]:
+    """What a plant's loops are run in, by name."""
+    if plant.name in BENCHES:
+        return tuple(tasks_of(plant))
+    return tuple(SHIFTS if plant.name in SHIFT_MODES else SCENARIOS)
+
+
 def loops_of(
     rig: Rig,
     designs: Mapping[Path, str],
@@ -118,9 +125,8 @@ def loops_of(
     if name in SHIFT_MODES and wanted:
         what = f"{rig.name} has an estimator of its own: leave --estimator out"
         raise InputError(Message(what))
-    there = SHIFTS if name in SHIFT_MODES else SCENARIOS
-    there = tasks_of(rig.plant) if name in BENCHES else there
-    chosen = tuple(scenarios) or tuple(there)
+    there = scenarios_of(rig.plant)
+    chosen = tuple(scenarios) or there
     require(chosen, there, "the list of scenarios")
     if name not in SHIFT_MODES:
         wanted = wanted or (USUAL,)
@@ -176,6 +182,18 @@ def drawn(rig: Rig, rng: np.random.Generator) -> Plant:
         inside = draws[(draws >= known.lower) & (draws <= known.upper)]
         values[name] = float(inside[0]) if len(inside) else value
     return plant.with_values(values)
+
+
+def recorded_runs(loops: Loops, runs: int, say: Callable[[str], None]) -> Checked:
+    """A few runs in this process with their records, to be judged and drawn again later."""
+    rows, records = [], []
+    for number in range(runs):
+        say(f"run {number + 1} of {runs}")
+        found = loops.once(drawn_plant(loops.rig, number), number)
+        mark = f" {number + 1}" if runs > 1 else ""
+        rows += [replace(row, design=row.design + mark) for row in found.rows]
+        records += found.records
+    return replace(found, rows=tuple(rows), records=tuple(records))
 
 
 def styled_figures(found: Checked) -> dict[str, Figure]:

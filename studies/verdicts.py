@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import nan
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from studies.checking import drawn_plant
 from studies.documents import Document, plain
 from studies.specification import Asked, Specification
 from studies.text import columns, shown
+from workbench.closed_loop import LoopRecord
 from workbench.plant import Plant
 from workbench.rig import Rig
 from workbench.units import public_name, si_unit
@@ -126,6 +128,13 @@ class Figures:
     scenario: str
     estimator: str
     found: Mapping[str, float]
+
+
+def figures_of(spec: Specification, row: Any, record: LoopRecord) -> Figures:
+    """What every line that is judged in the scenario of a loop finds in it."""
+    lines = (line for line in spec.asked if row.scenario in line.scenarios)
+    found = {line.name: line.found(row, record) for line in lines}
+    return Figures(row.scenario, getattr(row, "estimator", ""), found)
 
 
 def judge(spec: Specification, rig: Rig, runs: Sequence[Sequence[Figures]]) -> Judged:

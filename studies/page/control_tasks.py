@@ -11,9 +11,10 @@ from linearize.cuts import Interval
 from linearize.hybrid_simulation import sampled_hybrid
 from linearize.modes import HybridModel
 from linearize.prediction import prediction_of
+from linearize.standard import SHIFT_MODES
 from linearize.stopped import has_stops
 from linearize.visits import joined, recorded_visits, windows
-from studies.checking import check_gears, check_rig, shifts_gears, styled_figures
+from studies.checking import loops_of, recorded_runs, styled_figures
 from studies.closed_loop_check import Check
 from studies.design_text import certificate_text, margins_text, search_text
 from studies.figures.modes import pole_figure
@@ -122,12 +123,11 @@ def close_loops(
     found = design(method, rig.plant, numbers)
     path = Path(target)
     write_design(found, path)
-    if shifts_gears(rig):
-        told = search_text(found.controller)
-        checked = check_gears(rig, [path], scenarios, runs, say)
-    else:
-        told = _certified(found, say)
-        checked = check_rig(rig, [path], estimators or ["ekf"], scenarios, runs, say)
+    shifts = rig.plant.name in SHIFT_MODES
+    told = search_text(found.controller) if shifts else _certified(found, say)
+    observers = () if shifts else estimators
+    loops = loops_of(rig, {path: path.read_text(encoding="utf-8")}, observers, scenarios)
+    checked = recorded_runs(loops, runs, say)
     return Looped(target, told, checked, drawings(styled_figures(checked)))
 
 

@@ -66,13 +66,12 @@ class DesignTab:
 
     def show(self, session: Session) -> None:
         """The closed loops of a session."""
-        from studies.checking import shifts_gears
-        from studies.shift_check import SHIFTS
+        from studies.checking import scenarios_of
 
-        if session.steps and shifts_gears(session.now.rig):
-            self._scenario.options = [*SHIFTS]
-            if self._scenario.value not in SHIFTS:
-                self._scenario.value = next(iter(SHIFTS))
+        if session.steps:
+            self._scenario.options = known = [*scenarios_of(session.now.rig.plant)]
+            if self._scenario.value not in known:
+                self._scenario.value = known[0]
         found = session.looped
         if found is self._shown:
             return
@@ -84,9 +83,8 @@ class DesignTab:
 
     def _judge(self) -> None:
         """The specification as it is typed against the loops that were run last."""
-        from studies.checking import drawn_plants
         from studies.specification import read_specification
-        from studies.verdicts import judge
+        from studies.verdicts import figures_of, judge
 
         session, content = self._page.session, self._spec.value
         if not session.steps or not content.strip():
@@ -103,7 +101,11 @@ class DesignTab:
             put(self._verdict, f'<p class="guide">{said}</p>')
             return
         runs = 1 + max((_run_of(row.design) for row in found.check.rows), default=0)
-        verdict = judge(asked, rig, found.check, drawn_plants(rig, runs))
+        pairs = zip(found.check.rows, found.check.records, strict=True)
+        loops = [figures_of(asked, *pair) for pair in pairs]
+        each = len(loops) // runs
+        by_run = [loops[k : k + each] for k in range(0, len(loops), each)]
+        verdict = judge(asked, rig, by_run)
         word = "met" if verdict.met else f"missed: {', '.join(verdict.missed)}"
         kind = "busy" if verdict.met else "wrong"
         put(self._verdict, f'<p class="{kind}" role="status">specification {escape(word)}</p>'
