@@ -130,6 +130,7 @@ def cluster(folder, workers=2):
     try:
         until(lambda: file.exists() and file.read_text().endswith("}"))
         address = json.loads(file.read_text())["address"]
+        local += ["--local-directory", str(folder)]
         worker = [*dask, "worker", address, *local, "--nthreads", "1", "--no-nanny"]
         started += [subprocess.Popen(worker, env=around, **quiet) for _ in range(workers)]
         yield address
