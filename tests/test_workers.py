@@ -124,7 +124,9 @@ def cluster(folder, workers=2):
     dask = [sys.executable, "-m", "dask"]
     started = [
         subprocess.Popen(
-            [*dask, "scheduler", *local, "--port", "0", "--scheduler-file", str(file)], **quiet
+            [*dask, "scheduler", *local, "--port", "0", "--scheduler-file", str(file)],
+            env=around,
+            **quiet,
         )
     ]
     try:
