@@ -15,6 +15,8 @@ from urllib.parse import urlsplit
 
 from bokeh.application import Application
 from bokeh.application.handlers.function import FunctionHandler
+from bokeh.core.validation import silence
+from bokeh.core.validation.warnings import EMPTY_LAYOUT
 from bokeh.resources import Resources
 from bokeh.server.server import BaseServer
 from bokeh.server.tornado import BokehTornado
@@ -167,5 +169,6 @@ def _bound(port: int | None) -> tuple[list[Any], int]:
 
 def serve(rig: Path | None, recordings: Sequence[Path], port: int | None, show: Callable) -> None:
     """The page until it is interrupted; ``show`` gets its address once it answers."""
+    silence(EMPTY_LAYOUT, True)  # tabs wait for results in empty columns
     server = PageServer(str(rig or ""), [*map(str, recordings)], port)
     server.run(lambda: show(server.address))
