@@ -23,7 +23,7 @@ from studies.followers import (
 from studies.kept import Kept
 from studies.study import Claim, Extent, Outcome, Study
 from studies.text import columns, number
-from studies.yardsticks import LIMITS, PAYLOADS_KG, Draw, draws, measured
+from studies.yardsticks import LIMITS, PAYLOADS_KG, Draw, draws, figures_of, measured
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -105,13 +105,8 @@ def _measured(draw: Draw, method: str, numbers: Mapping[str, Any]) -> dict[str, 
     return {mark: value if np.isfinite(value) else None for mark, value in found.items()}
 
 
-def _values(found: Sequence[Mapping[str, float | None]], mark: str) -> np.ndarray:
-    """One number of all draws; infinite where the loop did not stay finite."""
-    return np.array([np.inf if row[mark] is None else row[mark] for row in found], dtype=float)
-
-
 def _summary(found: Sequence[Mapping[str, float]], mark: str) -> dict[str, float]:
-    values = _values(found, mark)
+    values = figures_of(found, mark)
     return {"median": float(np.median(values)), "spread": _spread(values)}
 
 
@@ -124,7 +119,7 @@ def _claims(rows: Rows) -> Iterator[Claim]:
     for mark, limit in LIMITS.items():
         medians, spreads = [], []
         for kg in PAYLOADS_KG:
-            values = _values(rows[best, kg], mark)
+            values = figures_of(rows[best, kg], mark)
             medians.append(float(np.median(values)))
             spreads.append(_spread(values))
         told = f"medians {', '.join(number(m, 3) for m in medians)}; 95 % {number(max(spreads), 3)}"
@@ -147,7 +142,7 @@ def _text(rows: Rows) -> str:
             f"{kg:g}",
             *(
                 f"{number(float(np.median(v)), 3)} ({number(_spread(v), 3)})"
-                for v in (_values(found, mark) for mark in LIMITS)
+                for v in (figures_of(found, mark) for mark in LIMITS)
             ),
         )
         for (name, kg), found in rows.items()

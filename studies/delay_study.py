@@ -27,7 +27,7 @@ from studies.kept import Kept, Row
 from studies.study import Claim, Extent, Outcome, Study
 from studies.text import columns, number
 from studies.workers import Workers
-from studies.yardsticks import Draw, draws, sine, step
+from studies.yardsticks import Draw, draw_of, medians, sine, step
 from workbench.effects.timing import PacketPause
 from workbench.plant import Plant
 
@@ -61,7 +61,7 @@ class Late:
 @lru_cache(maxsize=2)
 def _designed(name: str, number: int) -> tuple[Draw, Design]:
     """A draw and the design on what is believed of it."""
-    (draw,) = [d for d in draws(number + 1, (PAYLOAD_KG,)) if d.number == number]
+    draw = draw_of(number, PAYLOAD_KG)
     method, numbers = DESIGNS[name]
     return draw, design(method, draw.believed, numbers)
 
@@ -132,7 +132,7 @@ def outcome(asked: Sequence[Late], rows: Sequence[Mapping[str, Any]]) -> Outcome
             for p, row in zip(asked, rows, strict=True)
             if (p.design, p.delay_ms, p.redraw_hz) == (name, delay, redraw)
         ]
-        found[name, delay, redraw] = {mark: _median(same, mark) for mark in JUDGED}
+        found[name, delay, redraw] = medians(same, JUDGED)
     numbers = {f"{n} {d:g} ms {r:g} Hz": v for (n, d, r), v in found.items()}
     curves = {
         name: {mark: [found[name, d, 0.0][mark] for d in DELAYS_MS] for mark in JUDGED}
@@ -141,10 +141,6 @@ def outcome(asked: Sequence[Late], rows: Sequence[Mapping[str, Any]]) -> Outcome
     figures = {"delays": delay_figure(DELAYS_MS, curves, margin)}
     text = _text(found, margin, len({p.number for p in asked}))
     return Outcome(text, (*_claims(found, margin),), figures, {"medians": numbers})
-
-
-def _median(rows: Sequence[Mapping[str, Any]], mark: str) -> float:
-    return float(np.median([np.inf if row[mark] is None else row[mark] for row in rows]))
 
 
 def _range_ms(

@@ -24,7 +24,7 @@ from studies.kept import Kept, Row
 from studies.study import Claim, Extent, Outcome, Study
 from studies.text import columns, number
 from studies.workers import Workers
-from studies.yardsticks import FINAL, LARGE, ONE, RISE, draws, measured
+from studies.yardsticks import FINAL, LARGE, ONE, RISE, draw_of, measured, medians
 from workbench.plant import Plant
 
 DRAWS = {Extent.QUICK: 3, Extent.FULL: 20}
@@ -68,7 +68,7 @@ class Poorer:
 
 def worked(piece: Poorer) -> Row:
     """The yardsticks of one draw; None for a figure that it does not have."""
-    (draw,) = [d for d in draws(piece.number + 1, (PAYLOAD_KG,)) if d.number == piece.number]
+    draw = draw_of(piece.number, PAYLOAD_KG)
     method, numbers = DESIGNS[DESIGN]
     poorer = replace(draw, believed=LACKING[piece.lacking](draw.believed))
     found = measured(poorer, method, numbers)
@@ -86,19 +86,11 @@ def run(folder: Path, extent: Extent, say: Callable[[str], None]) -> Outcome:
     return outcome(found)
 
 
-def medians(rows: Sequence[Mapping[str, Any]]) -> dict[str, float]:
-    """Of every figure over the draws; infinite where most have none."""
-    return {
-        mark: float(np.median([np.inf if row[mark] is None else row[mark] for row in rows]))
-        for mark in JUDGED
-    }
-
-
 def outcome(rows: Mapping[str, Sequence[Mapping[str, Any]]]) -> Outcome:
     """Table, claims, figure and numbers."""
     from studies.figures.fidelity import fidelity_figure
 
-    found = {name: medians(of_one) for name, of_one in rows.items()}
+    found = {name: medians(of_one, JUDGED) for name, of_one in rows.items()}
     whole = found[WHOLE]
     worse = {name: {m: v[m] / whole[m] for m in JUDGED} for name, v in found.items()}
     head = ("the design model lacks", *JUDGED)

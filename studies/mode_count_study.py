@@ -29,7 +29,7 @@ from studies.scenarios import SAMPLE_TIME_S, Scenario
 from studies.study import Claim, Extent, Outcome, Study
 from studies.text import columns, number
 from studies.workers import Workers
-from studies.yardsticks import draws, sine
+from studies.yardsticks import draw_of, medians, sine
 from workbench.plant import Plant
 
 DRAWS = {Extent.QUICK: 3, Extent.FULL: 20}
@@ -74,7 +74,7 @@ def parted_modes(plant: Plant, places: int) -> HybridModel:
 
 def worked(piece: Parted) -> Row:
     """The figures of one draw; None where the loop was lost."""
-    (draw,) = [d for d in draws(piece.number + 1, (PAYLOAD_KG,)) if d.number == piece.number]
+    draw = draw_of(piece.number, PAYLOAD_KG)
     method, numbers = DESIGNS[piece.design]
     found = CONTROLLERS[method]
     spec = replaced(found.spec(), numbers, method)
@@ -122,13 +122,7 @@ def outcome(rows: Mapping[tuple[str, int], Sequence[Mapping[str, Any]]]) -> Outc
     """Table, claims, figure and numbers."""
     from studies.figures.mode_count import mode_count_figure
 
-    found = {
-        key: {
-            mark: float(np.median([np.inf if r[mark] is None else r[mark] for r in of_one]))
-            for mark in JUDGED
-        }
-        for key, of_one in rows.items()
-    }
+    found = {key: medians(of_one, JUDGED) for key, of_one in rows.items()}
     head = ("design", "parts", "modes", *JUDGED)
     lines = [
         (name, str(places), str(9 * places), *(number(values[mark], 3) for mark in JUDGED))

@@ -26,6 +26,7 @@ from studies.scenarios import SAMPLE_TIME_S, Scenario
 from studies.study import Claim, Extent, Outcome, Study
 from studies.verdicts import drawn_values
 from studies.workers import Workers
+from studies.yardsticks import figures_of
 from workbench.rig import Rig, default_rig
 
 DRAWS = {Extent.QUICK: 60, Extent.FULL: 1000}
@@ -115,7 +116,7 @@ def summary(rows: Sequence[Mapping[str, Any]]) -> Robustness:
     """The lines over all draws."""
     lines = []
     for name, (_, _, limit) in LIMITS.items():
-        found = np.array([np.inf if (v := row["found"][name]) is None else v for row in rows])
+        found = figures_of([row["found"] for row in rows], name)
         lines.append(Line(name, f"at most {limit:g}", found, found > limit))
     names = dict.fromkeys(name for row in rows for name in row["deviations"])
     off = {name: np.array([row["deviations"].get(name, 0.0) for row in rows]) for name in names}

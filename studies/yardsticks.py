@@ -11,7 +11,7 @@ tracking control algorithms for pneumatic cylinder actuators", IEEE/ASME Trans. 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -58,14 +58,33 @@ class Draw:
 
 def draws(number: int, payloads_kg: tuple[float, ...] = PAYLOADS_KG) -> Iterator[Draw]:
     """The same draws at every call; those of one number differ in nothing but the payload."""
-    rig = default_rig(servo_drive())
     for k in range(number):
-        rng = np.random.default_rng(FIRST_SEED + k)
-        factor = rng.uniform(1.0 - KNOWN_WITHIN, 1.0 + KNOWN_WITHIN)
-        found = drawn(_weighed(rig), rng)
-        for kg in payloads_kg:
-            believed = rig.plant.with_values({MASS: kg * factor})
-            yield Draw(kg, k, found.with_values({MASS: kg}), believed)
+        yield from _of(k, payloads_kg)
+
+
+def draw_of(number: int, payload_kg: float) -> Draw:
+    """The draw of one number that :func:`draws` gives, without those before it."""
+    return next(_of(number, (payload_kg,)))
+
+
+def _of(number: int, payloads_kg: tuple[float, ...]) -> Iterator[Draw]:
+    rig = default_rig(servo_drive())
+    rng = np.random.default_rng(FIRST_SEED + number)
+    factor = rng.uniform(1.0 - KNOWN_WITHIN, 1.0 + KNOWN_WITHIN)
+    found = drawn(_weighed(rig), rng)
+    for kg in payloads_kg:
+        believed = rig.plant.with_values({MASS: kg * factor})
+        yield Draw(kg, number, found.with_values({MASS: kg}), believed)
+
+
+def figures_of(rows: Sequence[Mapping[str, float | None]], mark: str) -> np.ndarray:
+    """One figure of all draws, (n_draws,); infinite where a draw has none."""
+    return np.array([np.inf if row[mark] is None else row[mark] for row in rows], dtype=float)
+
+
+def medians(rows: Sequence[Mapping[str, float | None]], marks: Iterable[str]) -> dict[str, float]:
+    """Of every figure over the draws; infinite where most have none."""
+    return {mark: float(np.median(figures_of(rows, mark))) for mark in marks}
 
 
 def _weighed(rig: Rig) -> Rig:
