@@ -131,7 +131,7 @@ def _best_alone(hybrid: HybridModel, judged: Windows) -> PredictionError:
 def _curve(errors: Errors, found: Others, number_of_standard: int) -> Figure:
     numbers = [*errors[JUDGED_ON]]
     curves = {
-        "placed, on the recording they were placed on": errors[PLACED_ON],
+        "placed, on the recordings they were placed on": errors[PLACED_ON],
         "placed, on another recording": errors[JUDGED_ON],
     }
     standard, single = found["standard"][JUDGED_ON].total, found["single"][JUDGED_ON].total
