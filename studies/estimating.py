@@ -18,7 +18,7 @@ import numpy as np
 from estimators import ESTIMATORS
 from estimators.observed import Observed, observed
 from estimators.scheduled_kalman import noise_for
-from estimators.tuning import TunedNoise, tuned_noise
+from estimators.tuning import TunedNoise, suited, tuned_noise
 from studies.estimated import Estimated, EstimatedRecording
 from studies.estimator_runs import (
     Followed,
@@ -160,13 +160,15 @@ class _Bench:
         plant = self.plant.with_inputs_commanded()
         states, size = plant.model.states, self.deviations
         noise = noise_for(ESTIMATORS[name], plant, self.tuned.process_noise)
-        return ESTIMATORS[name](
+        estimator = ESTIMATORS[name](
             plant=plant,
             sample_time_s=self.recording.sample_time_s,
             measurement_noise=self.noise,
             process_noise=noise,
             initial_deviation=dict(zip(states, size, strict=True)),
         )
+        _, u, y = fed(self.plant, self.recording)
+        return suited(estimator, u, y, self.say)
 
     @cached_property
     def observed(self) -> Observed:

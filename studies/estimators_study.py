@@ -7,11 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from estimators.tuning import own_noise
 from linearize.analysis import analyse_all
 from linearize.standard import standard_modes
 from studies.estimator_benches import (
@@ -28,6 +30,7 @@ from studies.estimator_benches import (
 )
 from studies.estimator_claims import (
     ALL,
+    REDUCED,
     consistency_claims,
     consistency_text,
     courses,
@@ -176,11 +179,14 @@ def _velocity(work: Work, plant: str) -> dict[str, Any]:
         )["rmse"]
     }
     for name in ALL:
+        estimator = made(name, lean, noise, start(lean))
+        if name in REDUCED:
+            own = work.piece(f"noise {plant} {name}", partial(_own, estimator, first, work.say))
+            estimator = estimator.retuned(own)
         errors = [
-            work.piece(
-                f"velocity {plant} {name} {k}",
-                lambda r=r, name=name: {"rmse": _error(name, lean, noise, r, velocity)},
-            )["rmse"]
+            work.piece(f"velocity {plant} {name} {k}", partial(_error, estimator, r, velocity))[
+                "rmse"
+            ]
             for k, r in enumerate(runs)
         ]
         kept = np.array([np.nan if each is None else each for each in errors])
@@ -188,15 +194,19 @@ def _velocity(work: Work, plant: str) -> dict[str, Any]:
     return found
 
 
-def _error(
-    name: str, plant: Any, noise: Mapping[str, float], r: TrueRun, state: str
-) -> float | None:
+def _own(estimator: Any, first: TrueRun, say: Callable[[str], None]) -> dict[str, float]:
+    """Process noise under which an estimator finds the start of a run likeliest."""
+    u, y = first.commands[:, :SAMPLES], first.measured[:, :SAMPLES]
+    return dict(own_noise(estimator, u, y, say).process_noise)
+
+
+def _error(estimator: Any, r: TrueRun, state: str) -> dict[str, float | None]:
     """RMS error of a state, none where the estimator was lost."""
     try:
-        found = follow(made(name, plant, noise, start(plant)), r.commands, r.measured, 0)
+        found = follow(estimator, r.commands, r.measured, 0)
     except ArithmeticError:
-        return None
-    return rmse((found.state(state) - r.truth[state])[LATE:])
+        return {"rmse": None}
+    return {"rmse": rmse((found.state(state) - r.truth[state])[LATE:])}
 
 
 def _observability() -> dict[str, Any]:
