@@ -20,10 +20,10 @@ from typing import Any
 import numpy as np
 
 from studies.controllers_study import DESIGNS
-from studies.kept import Kept, Row
+from studies.draws import kept_rows
+from studies.kept import Row
 from studies.study import Claim, Extent, Outcome, Study
 from studies.text import columns, number
-from studies.workers import Workers
 from studies.yardsticks import FINAL, LARGE, ONE, RISE, draw_of, measured, medians
 from workbench.plant import Plant
 
@@ -78,8 +78,7 @@ def worked(piece: Poorer) -> Row:
 def run(folder: Path, extent: Extent, say: Callable[[str], None]) -> Outcome:
     """Every lack with every draw; what is kept in the folder is not done again."""
     pieces = {f"{name} {k}": Poorer(name, k) for k in range(DRAWS[extent]) for name in LACKING}
-    kept = Kept(folder / "work" / "rows.jsonl")
-    rows = Workers().keep(kept, worked, pieces, lambda done, of: say(f"{done} of {of} loops"))
+    rows = kept_rows(folder, worked, pieces, say)
     found: dict[str, list[Mapping[str, Any]]] = {name: [] for name in LACKING}
     for piece, row in zip(pieces.values(), rows, strict=True):
         found[piece.lacking].append(row["found"])
