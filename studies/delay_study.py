@@ -192,4 +192,6 @@ STUDY = Study(
     question="how late may commands come, and how often may packets pause?",
     source="paper 001 Figs. 12 to 14 (S001-6, S001-7), asked of paper 002's drive",
     run=run,
+    plants=("servo_drive",),
+    seeds="draw k, from 0: 1001 + k",
 )

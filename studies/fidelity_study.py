@@ -129,4 +129,6 @@ STUDY = Study(
     question="what is each physical effect of the design model worth for control?",
     source="paper 000, value of fidelity (S000-8, S000-9), asked of paper 002's drive",
     run=run,
+    plants=("servo_drive",),
+    seeds="draw k, from 0: 1001 + k",
 )

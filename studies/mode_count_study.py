@@ -149,4 +149,6 @@ STUDY = Study(
     question="how many modes along the stroke does a controller need?",
     source="physics.md 4.3 (modes of the servo drive); paper 003 has two positions",
     run=run,
+    plants=("servo_drive",),
+    seeds="draw k, from 0: 1001 + k",
 )

@@ -141,4 +141,6 @@ STUDY = Study(
     question="how often does one design miss its lines over drives that nobody knows exactly?",
     source="issue of the studies; Clopper and Pearson 1934",
     run=run,
+    plants=("servo_drive",),
+    seeds="draw k, from 0: 5001 + k",
 )

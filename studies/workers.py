@@ -55,7 +55,7 @@ class Workers:
         count = self.processes or cpu_count()
         here = {"backend": "loky", "n_jobs": count, "inner_max_num_threads": 1}
         with parallel_config(**here if count > 1 else {"backend": "sequential"}):
-            yield from Parallel(return_as="generator_unordered")(
+            yield from Parallel(return_as="generator_unordered", batch_size=1)(
                 delayed(_done)(work, key, piece) for key, piece in pieces.items()
             )
 

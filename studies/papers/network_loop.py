@@ -268,4 +268,5 @@ STUDY = Study(
     source="paper 001 Figs. 12 to 14",
     run=run,
     rows=("S001-6", "S001-7"),
+    plants=("crr_arm",),
 )

@@ -293,4 +293,6 @@ STUDY = Study(
     source="paper 003 Figs. 2, 3 and Table I",
     run=run,
     rows=("S003-1", "S003-2"),
+    plants=("gearbox",),
+    seeds="of the actuators 1 to 5, of the full extent 1 to 20",
 )

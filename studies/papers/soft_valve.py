@@ -262,4 +262,6 @@ STUDY = Study(
     source="paper 004 Figs. 5, 6",
     run=run,
     rows=("S004-1", "S004-2"),
+    plants=("soft_joint",),
+    seeds="of the currents 1",
 )
