@@ -229,7 +229,7 @@ def _figure(loops: Mapping[str, Loop], reference: np.ndarray):
     shown = (
         ("1 ms each way", BLUE, "-"),
         ("redraw 1 Hz", GREEN, "--"),
-        ("redraw 10 Hz", RED, "-"),
+        ("redraw 10 Hz", RED, "-."),
     )
     lines = [Line(time_s, reference, "reference", ":", BLACK)]
     lines += [Line(time_s, loops[n].angle, n, style, colour) for n, colour, style in shown]

@@ -215,7 +215,7 @@ def _sine_figure(tracked: Mapping[float, tuple[Recording, np.ndarray]]):
         x_range=(0.0, 3.2),
         y_range=(0.0, 35.0),
     )
-    panel = Panel("part of the period", "position (mm)", left)
+    panel = Panel("part of the period (-)", "position (mm)", left)
     return panels_figure([[panel, right]], PAGE_IN, 2.8, legend_columns=5)
 
 

@@ -265,6 +265,9 @@ def _claims(
     yield Claim(claim, told, max(left_out.values()) < SMALL_M)
 
 
+PRESSURE_LOOKS = (("p1", BLUE, ":", "-"), ("p2", RED, "-.", "--"))
+
+
 def _figure(models: Mapping[str, Shift], drawn: Mapping[str, list[Shift]]):
     rows = [[], []]
     for name, ours in models.items():
@@ -275,13 +278,13 @@ def _figure(models: Mapping[str, Shift], drawn: Mapping[str, list[Shift]]):
         places.append(Line(1e3 * ours.time_s, 1e3 * ours.seen[2], "model", "-", BLACK))
         rows[0].append(Panel("time (ms)", "position (mm)", places, name, x_range=span))
         lines = []
-        for k, (label, colour) in enumerate((("p1", BLUE), ("p2", RED))):
+        for k, (label, colour, of_rigs, of_model) in enumerate(PRESSURE_LOOKS):
             lines += [
-                Line(1e3 * r.time_s, 1e-5 * r.seen[k], f"{label}, rigs", ":", colour, 0.7)
+                Line(1e3 * r.time_s, 1e-5 * r.seen[k], f"{label}, rigs", of_rigs, colour, 0.6)
                 for r in real
             ]
             lines.append(
-                Line(1e3 * ours.time_s, 1e-5 * ours.seen[k], f"{label}, model", "-", colour)
+                Line(1e3 * ours.time_s, 1e-5 * ours.seen[k], f"{label}, model", of_model, colour)
             )
         rows[1].append(Panel("time (ms)", "pressure (bar)", lines, x_range=span))
     return panels_figure(rows, PAGE_IN, 4.0, legend_columns=6)

@@ -244,7 +244,7 @@ def _figure(corners: list[Corner]):
     left = Panel("command (%)", "area (%)", lines_left)
     share = np.array([each.share for each in corners])
     right = Panel(
-        "corner, of the command's range",
+        "corner, share of the command's range (-)",
         "rise at the neutral command (psi/s)",
         [
             Line(share, np.array([each.creep_pa_s for each in corners]) / PSI_PA, "", "-", ORANGE),
