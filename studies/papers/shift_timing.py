@@ -51,6 +51,7 @@ PRINTED = {
 """Table I in percent: p1, p2, x."""
 FINE_S, TICK_S, LENGTH_S, RELEASE_S = 1e-4, 1e-3, 0.08, 0.2
 THERE_M, MOVED_M, RISE = 0.3e-3, 0.1e-3, 1.02
+PRESSURE_LOOKS = (("p1", BLUE, ":", "-"), ("p2", RED, "-.", "--"))
 SEEDS = {Extent.QUICK: range(1, 6), Extent.FULL: range(1, 21)}
 SMALL_M = 0.15e-3
 
@@ -263,9 +264,6 @@ def _claims(
     told = ", ".join(f"{name} {1e3 * off:.2f} mm" for name, off in left_out.items())
     claim = "heat and control chamber are unimportant: less than 0.15 mm of 12 mm"
     yield Claim(claim, told, max(left_out.values()) < SMALL_M)
-
-
-PRESSURE_LOOKS = (("p1", BLUE, ":", "-"), ("p2", RED, "-.", "--"))
 
 
 def _figure(models: Mapping[str, Shift], drawn: Mapping[str, list[Shift]]):
