@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
+import subprocess
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from studies.figures.style import save_all
-from studies.kept import Row
 from studies.registry import STUDIES
 from studies.study import NUMBERS, TEXT, Extent, Outcome, Study
 from studies.tables import noted_tables, write_tables
@@ -22,6 +24,7 @@ from workbench.errors import InputError, Message, listed, nearest, whole_file
 
 ALL = "all"
 DEBUG = "WORKBENCH_DEBUG"
+ENDED, BROKE = (0, 1), 3  # exit codes of a study that came to its claims, and of one that did not
 
 Say = Callable[[str], None]
 
@@ -89,59 +92,94 @@ class Part:
     name: str
     folder: Path
     extent: Extent
-    command: str
-    quiet: bool
+    quiet: bool = False
 
 
 def run_all(
     studies: Sequence[Study],
     folder: Path,
     extent: Extent,
-    command: str,
-    workers: Workers,
+    count: int,
     say: Say,
     show: Say,
     quiet: bool = False,
 ) -> list[str]:
-    """Run studies, each in a folder of its name; gives what fails, in words.
+    """Run studies, each in a process and a folder of its own; gives what fails, in words.
 
-    As many at a time as there are workers, the longest first, as the registry lists them.  What
-    the same code has finished is not run again.  A study that breaks off stops no other.
+    ``count`` run at a time, the longest first, as the registry lists them.  What the same code has
+    finished is not run again.  A study that breaks off stops no other.
     """
-    parts = {s.name: Part(s.name, folder / s.name, extent, command, quiet) for s in studies}
-    there = {name for name, part in parts.items() if _finished(part)}
-    left = {name: part for name, part in parts.items() if name not in there}
-    say(f"{len(there)} of {len(parts)} studies are there")
+    parts = [Part(study.name, folder / study.name, extent, quiet) for study in studies]
+    left = [part for part in parts if not _finished(part)]
+    there = len(parts) - len(left)
+    say(f"{there} of {len(parts)} studies are there")
     broke: dict[str, str] = {}
-    for done, (name, row) in enumerate(workers.results(_worked, left), start=len(there) + 1):
-        broke |= {name: row["broke"]} if row["broke"] else {}
-        say(f"{name} {'broke off' if row['broke'] else 'is there'}: {done} of {len(parts)} studies")
+    for name, reason in _each_done(left, count):
+        there += 1
+        broke |= {name: reason} if reason else {}
+        say(f"{name} {'broke off' if reason else 'is done'}: {there} of {len(parts)} studies")
     failed = []
-    for name, part in parts.items():
-        if name in broke:
-            failed.append(f"{name} broke off: {broke[name]}")
+    for part in parts:
+        if part.name in broke:
+            failed.append(f"{part.name} broke off: {broke[part.name]}")
             continue
         show((part.folder / TEXT).read_text(encoding="utf-8"))
-        failed += _failed(name, json.loads((part.folder / NUMBERS).read_text(encoding="utf-8")))
+        failed += _failed(part.name, json.loads((part.folder / NUMBERS).read_text("utf-8")))
     return failed
 
 
-def _worked(part: Part) -> Row:
-    """Run one study here, its draws in this process, its progress on stderr."""
+def _each_done(parts: Sequence[Part], count: int) -> Iterator[tuple[str, str]]:
+    """(name, why it broke off) of every study, as they end."""
+    with ThreadPoolExecutor(count) as threads:
+        doing = {threads.submit(done_apart, part): part.name for part in parts}
+        try:
+            for each in as_completed(doing):
+                yield doing[each], each.result()
+        except BaseException:
+            threads.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def done_apart(part: Part) -> str:
+    """Run one study in a process of its own; why it broke off, if it did.
+
+    Not in a process of joblib: some studies start processes themselves.
+    """
+    options = [*(["--full"] if part.extent is Extent.FULL else []), *(["-q"] * part.quiet)]
+    command = [sys.executable, "-m", "studies.running", part.name, str(part.folder), *options]
+    around = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    ended = subprocess.run(command, env=around, stdout=subprocess.PIPE, text=True, check=False)
+    if ended.returncode in ENDED:
+        return ""
+    return ended.stdout.strip() or f"exit code {ended.returncode}"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """One study of several, its draws in this process: ``python -m studies.running NAME DIR``."""
+    parser = argparse.ArgumentParser(prog="python -m studies.running", description=__doc__)
+    parser.add_argument("name", choices=STUDIES)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--full", action="store_true")
+    parser.add_argument("-q", "--quiet", action="store_true")
+    asked = parser.parse_args(arguments)
 
     def say(message: str) -> None:
-        if not part.quiet:
-            print(f"{part.name}: {message}", file=sys.stderr, flush=True)
+        if not asked.quiet:
+            print(f"{asked.name}: {message}", file=sys.stderr, flush=True)
 
+    extent = Extent.FULL if asked.full else Extent.QUICK
+    command = f"workbench study {asked.name}" + " --full" * asked.full
     try:
         with working_with(Workers(1)):
-            study = STUDIES[part.name]
-            run_study(study, part.folder, part.extent, part.command, say, lambda text: None)
+            study = STUDIES[asked.name]
+            return int(
+                bool(run_study(study, asked.folder, extent, command, say, lambda text: None))
+            )
     except Exception as error:
         if os.environ.get(DEBUG):
             raise
-        return {"broke": f"{type(error).__name__} {error}".strip().splitlines()[0]}
-    return {"broke": ""}
+        print(f"{type(error).__name__} {error}".strip().splitlines()[0])
+        return BROKE
 
 
 def _finished(part: Part) -> bool:
@@ -160,3 +198,7 @@ def _failed(name: str, document: Mapping[str, Any]) -> list[str]:
         for each in document["claims"]
         if not each["holds"]
     ]
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -37,6 +37,13 @@ class Workers:
     processes: int = 0
     scheduler: str = ""
 
+    @property
+    def count(self) -> int:
+        """Of processes, as many as this machine lets this one use where none are named."""
+        from joblib import cpu_count
+
+        return self.processes or cpu_count()
+
     def results(
         self, work: Callable[[Piece], Row], pieces: Mapping[str, Piece]
     ) -> Iterator[tuple[str, Row]]:
@@ -50,9 +57,9 @@ class Workers:
         if self.scheduler:
             yield from _on_cluster(self.scheduler, work, pieces)
             return
-        from joblib import Parallel, cpu_count, delayed, parallel_config
+        from joblib import Parallel, delayed, parallel_config
 
-        count = self.processes or cpu_count()
+        count = self.count
         here = {"backend": "loky", "n_jobs": count, "inner_max_num_threads": 1}
         with parallel_config(**here if count > 1 else {"backend": "sequential"}):
             yield from Parallel(return_as="generator_unordered", batch_size=1)(

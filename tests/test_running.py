@@ -1,14 +1,16 @@
 """Running all studies: what fails is named, what breaks off stops no other, what is done stays."""
 
 import json
+from contextlib import redirect_stdout
 from dataclasses import replace
+from io import StringIO
 from pathlib import Path
 
 import pytest
 from commands import call
 
 from studies.papers import soft_valve
-from studies.running import run_all, run_study
+from studies.running import Part, done_apart, main, run_all, run_study
 from studies.study import Claim, Extent, Outcome, Study
 from studies.text import columns
 from studies.workers import Workers, chosen_workers, working_with
@@ -36,16 +38,23 @@ def studies(monkeypatch):
     """One that holds, one that does not, one that breaks off; by name."""
     found = {s.name: s for s in (made("good"), made("bad", holds=False), made("lost", breaks=True))}
     monkeypatch.setattr("studies.running.STUDIES", found)
+    monkeypatch.setattr("studies.running.done_apart", here)
     DONE.clear()
     return found
 
 
+def here(part):
+    """What a process of its own would do, in this one."""
+    words = [part.name, str(part.folder), *["--full"] * (part.extent is Extent.FULL), "-q"]
+    said = StringIO()
+    with redirect_stdout(said):
+        ended = main(words)
+    return "" if ended in (0, 1) else said.getvalue().strip()
+
+
 def all_of(studies, folder, extent=Extent.QUICK):
     shown, said = [], []
-    failed = run_all(
-        [*studies.values()], folder, extent, "workbench study all", Workers(1),
-        said.append, shown.append, quiet=True,
-    )  # fmt: skip
+    failed = run_all([*studies.values()], folder, extent, 1, said.append, shown.append, quiet=True)
     return failed, "".join(shown), said
 
 
@@ -122,6 +131,16 @@ def test_wrong_input_of_one_study_is_told_as_it_is(studies, tmp_path, monkeypatc
     monkeypatch.setattr("studies.running.STUDIES", wrong)
 
     assert "is no rig" in all_of(wrong, tmp_path)[0][0]
+
+
+def test_a_study_runs_in_a_process_of_its_own(tmp_path):
+    folder = tmp_path / "soft-valve"
+    assert done_apart(Part("soft-valve", folder, Extent.QUICK, quiet=True)) == ""
+    assert json.loads((folder / "study.json").read_text())["claims"]
+    (tmp_path / "file").write_text("")
+
+    lost = done_apart(Part("soft-valve", tmp_path / "file" / "in it", Extent.QUICK, quiet=True))
+    assert lost.startswith("NotADirectoryError")
 
 
 def files(folder: Path):

@@ -50,7 +50,7 @@ def study(
         extent = Extent.FULL if full else Extent.QUICK
         where, asked = workers_of(workers, scheduler), chosen(name)
         if name == ALL and not scheduler:
-            failed = run_all(asked, output, extent, command_text(), where, say, typer.echo, quiet)
+            failed = run_all(asked, output, extent, where.count, say, typer.echo, quiet)
         else:
             failed = []
             for each in asked:
