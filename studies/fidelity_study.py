@@ -35,6 +35,8 @@ FRICTION = ("friction.coulomb_force_n", "friction.stiction_excess_n")
 DEAD_VOLUMES = ("chamber_a.dead_volume_m3", "chamber_b.dead_volume_m3")
 LEAK = "valve.leak_area_m2"
 JUDGED = (LARGE, ONE, FINAL, RISE)
+WORTH = {"dead zone of the valve": LARGE, "dry friction": LARGE, "dead volumes": ONE}
+"""What is worth modelling, and the figure that says so."""
 CLEAR = 2.0  # times as large: an effect that is clearly worth modelling
 SAME = 0.1  # share of a figure that is no difference
 
@@ -109,9 +111,9 @@ def _claims(worse: Mapping[str, Mapping[str, float]]) -> Sequence[Claim]:
         return f"{number(worse[name][mark], 3)} times as large"
 
     needed = [
-        Claim(f"{name} is worth modelling: {LARGE} without it at least {CLEAR:g} times as large",
-              told(name, LARGE), worse[name][LARGE] >= CLEAR)
-        for name in ("dead zone of the valve", "dry friction")
+        Claim(f"{name} worth modelling: {mark} without at least {CLEAR:g} times as large",
+              told(name, mark), worse[name][mark] >= CLEAR)
+        for name, mark in WORTH.items()
     ]  # fmt: skip
     heat = worse["heat of the walls"][LARGE]
     best = min(worse, key=lambda name: worse[name][LARGE])
