@@ -11,6 +11,7 @@ import numpy as np
 from estimators import ESTIMATORS
 from estimators.ahead import in_time
 from estimators.raw import RawMeasurement
+from studies.closed_loop_check import every_loop
 from studies.closed_loop_metrics import air_used_kg
 from studies.following import BAND, BENCHES, Task, leg_of
 from studies.text import columns, number, shown
@@ -98,13 +99,14 @@ def check_followed(
     truth, model, rows, records = plant.lean(), (believed or plant).lean(), [], []
     tasks = tasks_of(believed or plant)
     require(scenarios := tuple(scenarios), tasks, "the list of scenarios")
-    for design, controller in designs.items():
-        for estimator in estimators:
-            observer = observer_of(estimator, model, controller.sample_time_s)
-            for name in scenarios:
-                record = followed(truth, controller, observer, tasks[name], seed)
-                rows.append(measured(truth, record, tasks[name], design, estimator, controller))
-                records.append(record)
+    asked = [tasks[name] for name in scenarios]
+    for design, estimator, observer, task in every_loop(
+        designs, estimators, asked, observer_of, model
+    ):
+        controller = designs[design]
+        record = followed(truth, controller, observer, task, seed)
+        rows.append(measured(truth, record, task, design, estimator, controller))
+        records.append(record)
     return FollowingCheck(tuple(rows), tuple(records))
 
 

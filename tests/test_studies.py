@@ -212,10 +212,10 @@ def small():
 
 def test_a_study_writes_its_text_and_numbers_and_says_whether_claims_hold(small, tmp_path):
     said = []
-    holds = run_study(small, tmp_path, Extent.QUICK, "workbench study sum", print, said.append)
+    failed = run_study(small, tmp_path, Extent.QUICK, "workbench study sum", print, said.append)
 
     document = json.loads((tmp_path / "study.json").read_text())
-    assert not holds
+    assert failed == ["sum: two and two make five (4)"]
     assert document["claims"] == [{"claim": "two and two make five", "found": "4", "holds": False}]
     assert document["numbers"] == {"sum": 4}
     assert "NO" in said[0]
