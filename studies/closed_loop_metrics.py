@@ -192,10 +192,14 @@ COLUMNS = {
 
 def table(rows: Iterable[Metrics]) -> str:
     """The rows as text, one line each, in millimetres, milliseconds, grams and microseconds."""
-    head = [*LABELS, "reached", *(label for label, _ in COLUMNS.values())]
-    lines = ["".join(f"{label:>10}" for label in head)]
-    for row in rows:
-        words = [f"{getattr(row, label):>10}" for label in LABELS]
+    rows = [*rows]
+    named = [[getattr(row, label) for label in LABELS] for row in rows]
+    wide = [max(9, *map(len, column)) + 1 for column in zip(*named, strict=True)] or [10] * 3
+    head = [f"{label:>{n}}" for label, n in zip(LABELS, wide, strict=True)]
+    rest = ["reached", *(label for label, _ in COLUMNS.values())]
+    lines = ["".join([*head, *(f"{label:>10}" for label in rest)])]
+    for row, names in zip(rows, named, strict=True):
+        words = [f"{name:>{n}}" for name, n in zip(names, wide, strict=True)]
         words.append(f"{ANSWERS[row.reached]:>10}")
         values = [(getattr(row, key) * factor) for key, (_, factor) in COLUMNS.items()]
         words += [f"{'-' if np.isnan(value) else format(value, '.4g'):>10}" for value in values]
