@@ -91,6 +91,10 @@ class CompareTab:
             self._notes,
         )  # fmt: skip
 
+    def of(self, session: Session) -> tuple[Any, ...]:
+        """Parts of a session that it shows."""
+        return (session.compared,)
+
     def show(self, session: Session) -> None:
         """The comparison of a session."""
         found = session.compared

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import workbench
+from studies.page.balance_terms import terms_of
 from studies.page.drivers import Driver, Regimes, drivers_of, regime_errors
 from studies.page.plausibility import Finding, findings_of, gate_of
 from studies.text_of_results import addition_text, diagnosis_text, fit_text, unit_names
@@ -27,7 +28,7 @@ from workbench.rig import Rig
 Say = Callable[[str], None]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Opened:
     """A recording as its file was read, and what was found of it."""
 
@@ -36,7 +37,7 @@ class Opened:
     findings: tuple[Finding, ...]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Compared:
     """A comparison, and for each of its recordings what it is looked at against.
 
@@ -49,20 +50,24 @@ class Compared:
     regimes: tuple[Regimes, ...] = field(repr=False)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Diagnosed:
-    """A diagnosis without its fits; ``text`` is what the command line prints."""
+    """A diagnosis without its fits; ``text`` is what the command line prints.
+
+    ``terms`` hold the missing term of every balance by its name, the worst first.
+    """
 
     verdict: Verdict
     sentence: str
     ranking: tuple[Ranked, ...] = field(repr=False)
     where: Where | None = field(repr=False)
+    terms: Mapping[str, Where] = field(repr=False)
     next_recording: NextRecording | None = field(repr=False)
     warnings: tuple[str, ...]
     text: str = field(repr=False)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Accepted:
     """A rig after one effect was added, or a fit, without its fits; see ``Addition``."""
 
@@ -113,12 +118,15 @@ def diagnose(
     """The verb; the ranking comes without its fits."""
     enough_samples(rig, train)
     found = workbench.diagnose(rig, train, validation, say)
+    say("the missing term of every balance")
+    terms = terms_of(rig, found.base, found.where) if found.where else {}
     units = unit_names(rig.plant.measured + rig.plant.optional_outputs)
     return Diagnosed(
         found.verdict,
         found.sentence,
         tuple(replace(row, fit=None, validation=None) for row in found.ranking),
         found.where,
+        terms,
         found.next_recording,
         found.warnings,
         diagnosis_text(found, units),
