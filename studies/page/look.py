@@ -23,6 +23,8 @@ SMALL = 130  # of a chart: then few ticks
 STYLE = f"""
 body {{ margin: 0; background: #ffffff; color: {INK}; font: 14px {FONT}; }}
 :focus-visible {{ outline: 3px solid {ORANGE}; outline-offset: 1px; }}
+#loading {{ font-size: 18px; margin: 12px 20px; }}
+[data-root-id]:not(:empty) ~ #loading {{ display: none; }}
 """
 TEXT = f"""
 :host {{ font: 14px/1.45 {FONT}; color: {INK}; }}

@@ -12,7 +12,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import workbench
-from studies.page.balance_terms import terms_of
 from studies.page.drivers import Driver, Regimes, drivers_of, regime_errors
 from studies.page.plausibility import Finding, findings_of, gate_of
 from studies.text_of_results import addition_text, diagnosis_text, fit_text, unit_names
@@ -118,6 +117,8 @@ def diagnose(
     """The verb; the ranking comes without its fits."""
     enough_samples(rig, train)
     found = workbench.diagnose(rig, train, validation, say)
+    from studies.page.balance_terms import terms_of
+
     say("the missing term of every balance")
     terms = terms_of(rig, found.base, found.where) if found.where else {}
     units = unit_names(rig.plant.measured + rig.plant.optional_outputs)
