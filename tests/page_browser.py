@@ -72,7 +72,7 @@ class Served:
 
     def close(self):
         self.process.send_signal(signal.SIGINT)
-        assert self.process.wait(30) == 0
+        assert self.process.wait(120) == 0
 
 
 def click(page, label):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -48,7 +49,10 @@ class MissingTerm:
         self._choice.visible = bool(terms)
         self._balance.options = names = [*self._terms]
         first = names[0] if names else ""
-        put(self._head, f"<h2>Where the plant fails: the balance {first}</h2>" if first else "")
+        put(
+            self._head,
+            f"<h2>Where the plant fails: the balance {escape(first)}</h2>" if first else "",
+        )
         if self._balance.value == first:
             self._draw()
         else:
