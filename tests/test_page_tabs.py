@@ -81,6 +81,18 @@ def test_a_box_in_one_picture_lights_the_same_samples_in_all(page):
     assert not tab._traces.source.selected.indices
 
 
+def test_the_worst_residuals_are_selected_without_a_mouse(page):
+    tab = look_at(page, "Compare")
+
+    tab._worst()
+
+    error = np.abs(tab._traces.rows["e:slide.position_m"])
+    lit = tab._traces.selected
+    assert lit.mean() == pytest.approx(0.05, abs=0.005)
+    assert error[lit].min() >= error[~lit].max()
+    assert "samples lit" in tab._lit.text
+
+
 def test_a_zoom_sends_the_samples_of_the_window_and_keeps_what_is_lit(page):
     traces = look_at(page, "Compare")._traces
     traces.select(traces.rows["time"] > 0.5)

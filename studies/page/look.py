@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from html import escape
 from typing import TYPE_CHECKING, Any
 
-from studies.figures.style import BLUE, GREEN, ORANGE, RED
+from studies.figures.style import BLUE, ORANGE, RED
 from studies.page.plausibility import Finding, Mark
 
 if TYPE_CHECKING:
@@ -14,7 +14,11 @@ if TYPE_CHECKING:
     from bokeh.plotting import figure
 
 INK, SOFT, RULE, MEASURED = "#1f2933", "#52606d", "#d9dee4", "#7b8794"
-MARKS = {Mark.GOOD: (GREEN, "✓ good"), Mark.LOOK: ("#8a5a00", "▲ look"), Mark.STOP: (RED, "■ stop")}
+MARKS = {
+    Mark.GOOD: ("#00694d", "✓ good"),
+    Mark.LOOK: ("#8a5a00", "▲ look"),
+    Mark.STOP: ("#a34700", "■ stop"),
+}  # colours dark enough to be read as text
 FONT = "system-ui, -apple-system, 'Segoe UI', 'DejaVu Sans', sans-serif"
 GAP = 12
 NARROWEST = 240  # of a chart: one that begins narrower leaves a stripe
