@@ -11,7 +11,8 @@ import numpy as np
 
 from estimators import ESTIMATORS
 from estimators.ahead import in_time
-from estimators.scheduled_kalman import noise_for
+from estimators.per_mode import chosen_per_mode
+from estimators.scheduled_kalman import ScheduledKalman, noise_for
 from linearize.axes import stroke_m
 from linearize.standard import POSITION, PRESSURES, VELOCITY
 from studies.closed_loop_metrics import Metrics, measure, table
@@ -63,25 +64,33 @@ def sensors(plant: Plant) -> Hardware:
 def standard_estimator(name: str, plant: Plant, sample_time_s: float) -> Estimator:
     """An estimator of the registry for the sensors and the usual process noise, made once.
 
+    ``name`` may also choose by mode, see :mod:`estimators.per_mode`.
+
     Raises
     ------
     UnknownNameError
-        If there is no such estimator.
+        If there is no such estimator, or no such mode.
     """
-    if name not in ESTIMATORS:
-        what = f"no estimator {name}; there is {listed(ESTIMATORS)}"
-        raise UnknownNameError(Message(what, nearest=nearest(name, ESTIMATORS)))
     hardware, lean = sensors(plant), plant.lean()
     coarse = {key: grid / 12**0.5 for key, grid in hardware.resolution.items()}
     noise = {key: float(np.hypot(s, coarse.get(key, 0.0))) for key, s in hardware.noise.items()}
     process = {key: size for key, size in PROCESS_NOISE.items() if key in lean.model.states}
-    found = ESTIMATORS[name](
-        plant=lean,
-        sample_time_s=sample_time_s,
-        measurement_noise=noise,
-        process_noise=noise_for(ESTIMATORS[name], lean, process),
+
+    def made(one: str) -> Estimator:
+        if one not in ESTIMATORS:
+            what = f"no estimator {one}; there is {listed(ESTIMATORS)}"
+            raise UnknownNameError(Message(what, nearest=nearest(one, ESTIMATORS)))
+        return ESTIMATORS[one](
+            plant=lean,
+            sample_time_s=sample_time_s,
+            measurement_noise=noise,
+            process_noise=noise_for(ESTIMATORS[one], lean, process),
+        )
+
+    finder = ScheduledKalman(
+        plant=lean, sample_time_s=sample_time_s, measurement_noise=noise, process_noise={}
     )
-    return in_time(found, lean)
+    return in_time(chosen_per_mode(name, finder, made), lean)
 
 
 def check(

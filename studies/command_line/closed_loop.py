@@ -42,7 +42,9 @@ def check(
     estimator: Annotated[
         list[str] | None,
         typer.Option(
-            "--estimator", metavar="NAME", help="ekf (usual), ukf, imm, mhe; not for shifts."
+            "--estimator",
+            metavar="NAME",
+            help="ekf (usual), ukf, imm, mhe, kalman; not for shifts; by mode: ekf,ukf@stick.",
         ),
     ] = None,
     scenario: Annotated[

@@ -72,6 +72,10 @@ class AddTab:
             row(self._name, button("Save rig", self._save, main=True, name="save_rig")),
         )  # fmt: skip
 
+    def of(self, session: Session) -> tuple[Any, ...]:
+        """Parts of a session that it shows."""
+        return session.steps, session.offered
+
     def show(self, session: Session) -> None:
         """The steps of a session, and what may be added."""
         from bokeh.models import CheckboxGroup
@@ -109,7 +113,8 @@ class AddTab:
         steps = len(page.session.steps) - 1
         gone, come = sorted({*old} - {*new}), sorted({*new} - {*old})
         if gone and gone[0] < steps:
-            page.attempt(lambda session: back_to(session, gone[0]))
+            if not page.attempt(lambda session: back_to(session, gone[0])):
+                self._untick()
         elif come and come[0] >= steps:
             self._add(self._names[come[0]])
 
@@ -134,14 +139,21 @@ class AddTab:
             require_train(session)
             return session
 
-        if page.attempt(ready):
-            session = page.session
-            page.work(
-                action,
-                lambda found: lambda now: with_accepted(now, found, action),
-                task, session.now.rig, *more,
-                recordings(session.of(Role.TRAINING)), recordings(session.of(Role.VALIDATION)),
-            )  # fmt: skip
+        if not page.attempt(ready):
+            self._untick()
+            return
+        session = page.session
+        page.work(
+            action,
+            lambda found: lambda now: with_accepted(now, found, action),
+            task, session.now.rig, *more,
+            recordings(session.of(Role.TRAINING)), recordings(session.of(Role.VALIDATION)),
+            otherwise=self._untick,
+        )  # fmt: skip
+
+    def _untick(self) -> None:
+        """What was not accepted."""
+        self._ticks.active = [*range(len(self._page.session.steps) - 1)]
 
     def _save(self) -> None:
         target = self._name.value

@@ -19,7 +19,7 @@ from studies.page.look import (
     text,
 )
 from studies.page.mapping import Mapping
-from studies.page.replay import Action
+from studies.page.replay import NO_ACTION
 from studies.page.session import (
     File,
     Role,
@@ -93,6 +93,10 @@ class RecordingTab:
             self._mapping.build(),
         )  # fmt: skip
 
+    def of(self, session: Session) -> tuple[Any, ...]:
+        """Parts of a session that it shows."""
+        return session.steps, session.files, session.checked
+
     def show(self, session: Session) -> None:
         """The files of a session, and one of them drawn."""
         if session.steps:
@@ -152,7 +156,7 @@ class RecordingTab:
         if not page.attempt(lambda session: session.now and session):
             return
         page.work(
-            Action("", ""),
+            NO_ACTION,
             lambda found: lambda session: with_opened(session, found),
             tasks.open_recordings, page.session.now.rig, (path,),
         )  # fmt: skip
@@ -166,7 +170,7 @@ class RecordingTab:
 
         if page.attempt(ready):
             page.work(
-                Action("", ""),
+                NO_ACTION,
                 lambda found: lambda session: with_checked(session, found),
                 tasks.check_gate, page.session.now.rig,
                 recordings(page.session.of(Role.TRAINING)),

@@ -151,6 +151,7 @@ def _about(session: Session, steps: tuple[Step, ...]) -> Session:
         diagnosed=None,
         linearised=None,
         linearised_before=None,
+        offers=None,
         looped=None,
     )
 
