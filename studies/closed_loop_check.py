@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import TypeVar
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from workbench.errors import Message, UnknownNameError, listed, nearest
 from workbench.filtering import consistent_start
 from workbench.plant import Plant
 
+Asked = TypeVar("Asked")  # a scenario of a slide, or a task of a bench
 POSITION_NOISE_M, POSITION_GRID_M, PRESSURE_NOISE_PA = 5e-6, 5e-6, 500.0
 PROCESS_NOISE = {VELOCITY: 0.1, **dict.fromkeys(PRESSURES, 1e3)}
 
@@ -112,14 +114,30 @@ def check(
     truth, model = plant.lean(), (believed or plant).lean()
     chosen = [SCENARIOS[name](stroke_m(plant)) for name in scenarios]
     rows, records = [], []
-    for design, controller in designs.items():
-        for estimator in estimators:
-            observer = standard_estimator(estimator, model, controller.sample_time_s)
-            for scenario in chosen:
-                record = run(truth, controller, observer, scenario, seed)
-                rows.append(measure(truth, record, scenario, design, estimator))
-                records.append(record)
+    every = every_loop(designs, estimators, chosen, standard_estimator, model)
+    for design, estimator, observer, scenario in every:
+        record = run(truth, designs[design], observer, scenario, seed)
+        rows.append(measure(truth, record, scenario, design, estimator))
+        records.append(record)
     return Check(tuple(rows), tuple(records))
+
+
+def every_loop(
+    designs: Mapping[str, Controller],
+    estimators: Iterable[str],
+    scenarios: Iterable[Asked],
+    made: Callable[[str, Plant, float], Estimator],
+    believed: Plant,
+) -> Iterator[tuple[str, str, Estimator, Asked]]:
+    """(design, estimator, the estimator itself, scenario) of all loops, designs outermost.
+
+    ``made`` gives an estimator by its name, the plant that it knows, and its sample time.
+    """
+    estimators, scenarios = tuple(estimators), tuple(scenarios)
+    for design, controller in designs.items():
+        for name in estimators:
+            estimator = made(name, believed, controller.sample_time_s)
+            yield from ((design, name, estimator, scenario) for scenario in scenarios)
 
 
 def run(

@@ -12,6 +12,7 @@ from linearize.axes import stroke_m
 from linearize.reduction import closed_command
 from linearize.standard import POSITION, PRESSURES, SUPPLY
 from studies.scenarios import LATE_S, SAMPLE_TIME_S, Scenario
+from studies.text import columns
 from workbench.closed_loop import LoopRecord
 from workbench.plant import Plant
 
@@ -192,16 +193,12 @@ COLUMNS = {
 
 def table(rows: Iterable[Metrics]) -> str:
     """The rows as text, one line each, in millimetres, milliseconds, grams and microseconds."""
-    rows = [*rows]
-    named = [[getattr(row, label) for label in LABELS] for row in rows]
-    wide = [max(9, *map(len, column)) + 1 for column in zip(*named, strict=True)] or [10] * 3
-    head = [f"{label:>{n}}" for label, n in zip(LABELS, wide, strict=True)]
-    rest = ["reached", *(label for label, _ in COLUMNS.values())]
-    lines = ["".join([*head, *(f"{label:>10}" for label in rest)])]
-    for row, names in zip(rows, named, strict=True):
-        words = [f"{name:>{n}}" for name, n in zip(names, wide, strict=True)]
-        words.append(f"{ANSWERS[row.reached]:>10}")
+    head = [*LABELS, "reached", *(label for label, _ in COLUMNS.values())]
+    lines = []
+    for row in rows:
+        words = [getattr(row, label) for label in LABELS]
+        words.append(ANSWERS[row.reached])
         values = [(getattr(row, key) * factor) for key, (_, factor) in COLUMNS.items()]
-        words += [f"{'-' if np.isnan(value) else format(value, '.4g'):>10}" for value in values]
-        lines.append("".join(words))
-    return "\n".join(lines)
+        words += ["-" if np.isnan(value) else format(value, ".4g") for value in values]
+        lines.append(words)
+    return columns(head, lines)

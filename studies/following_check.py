@@ -13,6 +13,7 @@ from estimators.ahead import in_time
 from estimators.per_mode import chosen_per_mode
 from estimators.raw import RawMeasurement
 from estimators.scheduled_kalman import ScheduledKalman
+from studies.closed_loop_check import every_loop
 from studies.closed_loop_metrics import air_used_kg
 from studies.following import BAND, BENCHES, Task, leg_of
 from studies.text import columns, number, shown
@@ -100,13 +101,14 @@ def check_followed(
     truth, model, rows, records = plant.lean(), (believed or plant).lean(), [], []
     tasks = tasks_of(believed or plant)
     require(scenarios := tuple(scenarios), tasks, "the list of scenarios")
-    for design, controller in designs.items():
-        for estimator in estimators:
-            observer = observer_of(estimator, model, controller.sample_time_s)
-            for name in scenarios:
-                record = followed(truth, controller, observer, tasks[name], seed)
-                rows.append(measured(truth, record, tasks[name], design, estimator, controller))
-                records.append(record)
+    asked = [tasks[name] for name in scenarios]
+    for design, estimator, observer, task in every_loop(
+        designs, estimators, asked, observer_of, model
+    ):
+        controller = designs[design]
+        record = followed(truth, controller, observer, task, seed)
+        rows.append(measured(truth, record, task, design, estimator, controller))
+        records.append(record)
     return FollowingCheck(tuple(rows), tuple(records))
 
 
