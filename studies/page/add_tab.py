@@ -23,7 +23,15 @@ from studies.page.look import (
     text,
 )
 from studies.page.session import Role, Session, Step, recordings
-from studies.page.verbs import add_action, back_to, fit_action, require_train, save, with_accepted
+from studies.page.verbs import (
+    add_action,
+    back_to,
+    fit_action,
+    require_rig,
+    require_train,
+    save,
+    with_accepted,
+)
 from studies.text import number, shown
 from studies.text_of_results import spread, unit_names
 from workbench.units import public_name
@@ -128,18 +136,14 @@ class AddTab:
 
     def _fit(self) -> None:
         page = self._page
-        if page.attempt(lambda session: session.now and session):
+        if page.allows(require_rig):
             self._start(fit_action(page.session), tasks.fit)
 
     def _start(self, action: Any, task: Any, *more: str) -> None:
         """A job that gives the rig another step."""
         page = self._page
 
-        def ready(session: Session) -> Session:
-            require_train(session)
-            return session
-
-        if not page.attempt(ready):
+        if not page.allows(require_train):
             self._untick()
             return
         session = page.session

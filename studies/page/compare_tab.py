@@ -25,9 +25,8 @@ from studies.page.look import (
 from studies.page.residual_tests import ResidualTests
 from studies.page.session import Session, recordings
 from studies.page.traces import TIME, Traces, inside, on_box
-from studies.page.verbs import compare_action, with_compared
+from studies.page.verbs import compare_action, require_used, with_compared
 from studies.text import labelled, percent
-from workbench.errors import InputError, Message
 from workbench.units import display_unit, public_name
 
 if TYPE_CHECKING:
@@ -118,12 +117,7 @@ class CompareTab:
     def _compare(self) -> None:
         page = self._page
 
-        def ready(session: Session) -> Session:
-            if not session.used:
-                raise InputError(Message("no recording is open", expected="one in the first tab"))
-            return session
-
-        if page.attempt(ready):
+        if page.allows(require_used):
             session = page.session
             page.work(
                 compare_action(session),

@@ -11,6 +11,7 @@ from studies.page.control_verbs import design_action, with_looped
 from studies.page.drawn import as_html
 from studies.page.look import BUTTON, button, column, guide, put, row, sheet, text, wide
 from studies.page.session import Session
+from studies.page.verbs import require_rig
 from workbench.errors import InputError
 
 if TYPE_CHECKING:
@@ -134,7 +135,7 @@ class DesignTab:
         from studies.page.control_tasks import close_loops
 
         page = self._page
-        if not page.attempt(lambda session: session.now and session):
+        if not page.allows(require_rig):
             return
         session, method = page.session, self._method.value
         if not method:

@@ -89,11 +89,7 @@ class MissingTab:
     def _diagnose(self) -> None:
         page = self._page
 
-        def ready(session: Session) -> Session:
-            require_train(session)
-            return session
-
-        if page.attempt(ready):
+        if page.allows(require_train):
             session = page.session
             page.work(
                 diagnose_action(session),

@@ -9,6 +9,7 @@ from studies.page.control_verbs import modes_action, with_linearised
 from studies.page.drawn import as_html
 from studies.page.look import button, column, guide, put, row, text, wide
 from studies.page.session import Role, Session, recordings
+from studies.page.verbs import require_rig
 from studies.text import number
 from workbench.units import display_scale, display_unit, public_name
 
@@ -139,7 +140,7 @@ class ModesTab:
         from studies.page.control_tasks import linearise
 
         page = self._page
-        if not page.attempt(lambda session: session.now and session):
+        if not page.allows(require_rig):
             return
         session = page.session
         action = modes_action(session, choice)

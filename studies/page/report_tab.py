@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from studies.page.control_verbs import report_action, with_reported
 from studies.page.look import RULE, button, column, guide, put, row, text
 from studies.page.session import Role, Session, recordings
+from studies.page.verbs import require_rig
 
 if TYPE_CHECKING:
     from bokeh.models import Model
@@ -59,7 +60,7 @@ class ReportTab:
         from studies.page.reporting import Found, report_with_modes
 
         page, target = self._page, self._folder.value.strip() or "report"
-        if not page.attempt(lambda session: session.now and session):
+        if not page.allows(require_rig):
             return
         session = page.session
         action = report_action(session, target)

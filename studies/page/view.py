@@ -121,6 +121,15 @@ class Page:
         self.calm()
         return True
 
+    def allows(self, needs: Callable[[Session], object]) -> bool:
+        """True where nothing runs and the session has what an action needs; else says why not."""
+
+        def same(session: Session) -> Session:
+            needs(session)
+            return session
+
+        return self.attempt(same)
+
     def work(
         self,
         action: Action,
