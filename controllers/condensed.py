@@ -113,15 +113,24 @@ class Program:
 
     def bounds(self, unforced: np.ndarray, last_v: float) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper side of the rows: openings, what is soft twice, slacks."""
-        n = self.horizon
+        n, (lower, upper) = self.horizon, (side.copy() for side in self.sides)
         at = (unforced.reshape(n, -1) / SLACK_UNIT).ravel()
-        low, high = self.state_limits
-        moved = np.zeros(n)
-        moved[0] = last_v
-        none, slack = np.full(len(at) + n, np.inf), np.zeros(SLACKS)
+        soft = len(at) + n
+        lower[n : n + len(at)] -= at
+        upper[n + soft : n + soft + len(at)] -= at
+        lower[n + len(at)] += last_v
+        upper[n + soft + len(at)] += last_v
+        return lower, upper
+
+    @cached_property
+    def sides(self) -> tuple[np.ndarray, np.ndarray]:
+        """What :meth:`bounds` gives for states and a last opening of zero."""
+        n, (low, high) = self.horizon, self.state_limits
+        moved, slack = np.full(n, self.move_v), np.zeros(SLACKS)
+        none = np.full(len(low) + n, np.inf)
         first, last = (np.full(n, side) for side in self.openings)
-        lower = [first, low - at, moved - self.move_v, -none, slack]
-        upper = [last, none, high - at, moved + self.move_v, slack + np.inf]
+        lower = [first, low, -moved, -none, slack]
+        upper = [last, none, high, moved, slack + np.inf]
         return np.concatenate(lower), np.concatenate(upper)
 
     @cached_property
@@ -163,7 +172,7 @@ class Program:
 
     def prepared(self) -> Program:
         """The same program with its factors at hand, so that the first sample need not wait."""
-        _ = self.order, self.general, self.inverse
+        _ = self.order, self.general, self.inverse, self.sides
         return self
 
 

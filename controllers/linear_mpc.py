@@ -100,7 +100,8 @@ class LinearMpc:
         if late:
             steady = steady_plan(len(plan.openings), now.opening_v, now.x[0])
             plan, notes = (memory.plan or steady).shifted(), {"fallback": 1.0}
-        opening = float(np.clip(plan.openings[0], *valve.openings_v))
+        smallest_v, largest_v = valve.openings_v
+        opening = min(max(float(plan.openings[0]), smallest_v), largest_v)
         if opening in valve.openings_v:
             integral = memory.integral_m_s
         notes = {"resting": 0.0, "opening_v": opening, "integral_m_s": integral, **notes}
@@ -153,7 +154,8 @@ class LinearMpc:
         shift_pa = friction_n / (2.0 * self.task.area_m2)
         coming = reference[0, 1 : n + 1] if now.speed_m_s else np.full(n, reference[0, 0])
         limit = self.task.spec.approach_m
-        targets = np.tile(now.target, (n, 1))
+        targets = np.empty((n, len(now.target)))
+        targets[:] = now.target
         targets[:, 0] = now.x[0] + np.clip(coming - now.x[0], -limit, limit)
         targets[:, 2] -= shift_pa
         targets[:, 3] += shift_pa

@@ -8,6 +8,7 @@ included.  The three are differences of the coming reference.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -31,12 +32,13 @@ def motion(coming: np.ndarray, sample_time_s: float, limits: MotionLimits) -> np
 
     ``coming`` has shape (PREVIEW,), the present sample first.
     """
-    steps = np.diff(coming) / sample_time_s
-    if np.abs(steps).max() > limits.speed:
+    places = coming.tolist()
+    steps = [(b - a) / sample_time_s for a, b in pairwise(places)]
+    if max(map(abs, steps)) > limits.speed:
         return np.zeros(3)
-    bends = np.diff(steps) / sample_time_s
+    bends = [(b - a) / sample_time_s for a, b in pairwise(steps)]
     jerk = (bends[1] - bends[0]) / sample_time_s
-    bend = bends[0] if np.abs(bends).max() <= limits.acceleration else 0.0
+    bend = bends[0] if max(map(abs, bends)) <= limits.acceleration else 0.0
     return np.array([steps[0], bend, jerk if abs(jerk) <= limits.jerk else 0.0])
 
 

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from math import tanh
 from typing import Any
 
 import casadi as ca
@@ -30,6 +31,7 @@ from controllers.through_valve import ThroughValve, through_valve
 from linearize.modes import HybridModel
 from linearize.reduction import closed_command
 from linearize.standard import POSITION, PRESSURES, VELOCITY
+from workbench.called import Curve
 from workbench.effect import Conditions
 from workbench.effects.stribeck_friction import StribeckFriction
 from workbench.parts import Chamber
@@ -146,11 +148,11 @@ class Positioning:
         speed_m_s = wanted[0]
         turn_per_s = spec.turn_per_s if speed_m_s else spec.standing_per_s
         wish = (speed_m_s - turn_per_s * error_m) / spec.turn_m_s
-        ahead = 0.5 + 0.5 * np.tanh(wish)
+        ahead = 0.5 + 0.5 * tanh(wish)
         needed = sum(w * each.at(wanted) for w, each in self.sliding.weighted(x[0], ahead))
         rise_n = self._stribeck_n(x[1]) * (2.0 * ahead - 1.0)
         rise_pa = rise_n / (2.0 * self.area_m2)
-        near = x[0] - np.clip(error_m, -spec.approach_m, spec.approach_m)
+        near = x[0] - min(max(error_m, -spec.approach_m), spec.approach_m)
         target = np.array([near, speed_m_s, needed[0] + rise_pa, needed[1] - rise_pa])
         rests = self._rests(memory, error_m, x[1], speed_m_s)
         rate_m = self._rate_m(error_m, x[1])
@@ -167,15 +169,15 @@ class Positioning:
     def _rate_m(self, error_m: float, v_m_s: float) -> float:
         spec = self.spec
         if abs(v_m_s) < spec.resting_m_s / 2.0:
-            return spec.stuck_factor * float(np.clip(error_m, -spec.integrate_m, spec.integrate_m))
+            return spec.stuck_factor * min(max(error_m, -spec.integrate_m), spec.integrate_m)
         return error_m if abs(error_m) < spec.integrate_m else 0.0
 
     def _stribeck_n(self, v_m_s: float) -> float:
         """The compensated share of g(v) - F_C."""
-        return self.spec.stribeck_share * float(self.rise_n(v_m_s)) if self.friction else 0.0
+        return self.spec.stribeck_share * self.rise_n(v_m_s) if self.friction else 0.0
 
     @cached_property
-    def rise_n(self) -> ca.Function:
+    def rise_n(self) -> Curve:
         """Velocity -> dry friction above that of fast sliding, at the start of the stroke."""
         v, friction, now = ca.SX.sym("v"), self.friction, Conditions()
         for name in (*friction.chambers, "atmosphere"):
@@ -185,7 +187,7 @@ class Positioning:
         for velocity in (v, FAST_M_S):
             now.place(f"{friction.body}.velocity_m_s", velocity)
             forces.append(friction.dry_force_n(now))
-        return ca.Function("rise", [v], [forces[0] - forces[1]])
+        return Curve(ca.Function("rise", [v], [forces[0] - forces[1]]))
 
 
 def positioning(hybrid: HybridModel, spec: PositioningSpec) -> Positioning:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -37,10 +38,15 @@ class Schedule(Generic[Design]):
     forward: tuple[Design, ...]
     backward: tuple[Design, ...]
 
+    @cached_property
+    def _numbers(self) -> np.ndarray:
+        """Those of the points, shape (n,)."""
+        return np.arange(len(self.positions_m), dtype=float)
+
     def weighted(self, position_m: float, ahead: float) -> Iterator[tuple[float, Design]]:
         """Designs that count here with their weights; ``ahead`` is 1 forward, 0 backward."""
         last = len(self.positions_m) - 1
-        place = float(np.interp(position_m, self.positions_m, np.arange(last + 1)))
+        place = float(np.interp(position_m, self.positions_m, self._numbers))
         left = min(int(place), last - 1)
         right_share = place - left
         for share, designs in ((ahead, self.forward), (1.0 - ahead, self.backward)):

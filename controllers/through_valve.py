@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from math import tanh
 
+import casadi as ca
 import numpy as np
 
 from linearize.reduction import closed_command
+from workbench.called import Curve
 from workbench.contracts import Estimate
 from workbench.effects.valve_command import DeadZone, ValveLag
 from workbench.plant import Plant
@@ -63,9 +67,15 @@ class ThroughValve:
         wanted_v = self.centre_v + opening_v
         through_v = wanted_v
         if self.dead_zone is not None:
-            through_v = self.offset_v + self.dead_zone.undo(wanted_v - self.offset_v)
-        jump_v = (through_v - wanted_v) * np.tanh(abs(opening_v) / self.smooth_v)
-        return np.array([np.clip(wanted_v + jump_v, self.lower_v, self.upper_v)])
+            through_v = self.offset_v + self._undone(wanted_v - self.offset_v)
+        jump_v = (through_v - wanted_v) * tanh(abs(opening_v) / self.smooth_v)
+        return np.array([min(max(wanted_v + jump_v, self.lower_v), self.upper_v)])
+
+    @cached_property
+    def _undone(self) -> Curve:
+        """Wanted opening behind the dead zone -> what goes in before it."""
+        wanted = ca.SX.sym("wanted")
+        return Curve(ca.Function("undone", [wanted], [self.dead_zone.undo(wanted)]))
 
     @property
     def shut(self) -> np.ndarray:

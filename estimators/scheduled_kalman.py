@@ -88,8 +88,8 @@ class ScheduledKalman:
 
     def update(self, last: Estimate, command: np.ndarray, measurement: np.ndarray) -> Estimate:
         x, P = last.state, last.memory
-        z = np.concatenate([x, self._behind(x, command).full().ravel(), [1.0]])
-        k = self._mode_at(z)
+        z = self._row(x, command)
+        k = self._active(z)
         n, size, Q = len(x), self.sampled.hybrid.model.scale, self._step_covariance
         step = self.sampled.steps[k]
         later = self.sampled.stopped(x[None], (step @ z)[None])
@@ -119,7 +119,14 @@ class ScheduledKalman:
             other.__dict__[name] = getattr(self, name)
         return other
 
-    def _mode_at(self, z: np.ndarray) -> int:
+    def mode_at(self, x: np.ndarray, command: np.ndarray) -> int:
+        """Index of the mode at a state of the modes under a command as sent."""
+        return self._active(self._row(x, command))
+
+    def _row(self, x: np.ndarray, command: np.ndarray) -> np.ndarray:
+        return np.concatenate([x, self._behind(x, command).full().ravel(), [1.0]])
+
+    def _active(self, z: np.ndarray) -> int:
         if not self.mode:
             return int(self.sampled.active(z[None])[0])
         return [m.name for m in self.sampled.hybrid.modes].index(self.mode)

@@ -211,4 +211,6 @@ STUDY = Study(
     question="what do estimators know of velocity, pressures and modes, and do they know how well?",
     source="physics.md 2; Bar-Shalom, Li and Kirubarajan 2001, Sec. 5.4 and 11.6",
     run=run,
+    plants=("servo_drive", "gearbox"),
+    seeds="of the truth's cases, and the number of each run",
 )

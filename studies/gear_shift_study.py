@@ -174,4 +174,6 @@ STUDY = Study(
     question="which design shifts the gearbox fast and softly at any supply, and on drawn plants?",
     source="paper 003 and Appl. Sci. 2020, 10(10), 3514",
     run=run,
+    plants=("gearbox",),
+    seeds="draw k, from 0: 1 + k",
 )

@@ -1,12 +1,14 @@
 """Calls on arrays give what CasADi's own calls give, to the last bit."""
 
+import pickle
+
 import casadi as ca
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as some
 
-from workbench.called import called, prepared, result
+from workbench.called import Curve, called, prepared, result
 
 
 def polynomial() -> ca.Function:
@@ -61,3 +63,11 @@ def test_a_prepared_call_gives_the_same_and_keeps_no_result():
 
     assert first.tolist() == [2.0, 4.0, 6.0] and total.tolist() == [6.0]
     assert second.tolist() == [10.0, 12.0, 14.0]
+
+
+def test_a_curve_is_its_function_of_one_number_also_in_another_process():
+    v = ca.SX.sym("v")
+    curve = Curve(ca.Function("curve", [v], [ca.if_else(v > 0.0, v**2, -1.0)]))
+
+    for one in (curve, pickle.loads(pickle.dumps(curve))):
+        assert [one(value) for value in (3.0, 0.5, -2.0)] == [9.0, 0.25, -1.0]

@@ -63,6 +63,21 @@ def prepared(function: ca.Function) -> Callable[..., list[np.ndarray]]:
     return call
 
 
+class Curve:
+    """A function of one number and one value, called at every sample as :func:`prepared` does."""
+
+    def __init__(self, function: ca.Function) -> None:
+        self._function = function
+        self._call = prepared(function)
+
+    def __call__(self, value: float) -> float:
+        return float(self._call(np.array([value], dtype=float))[0][0])
+
+    def __reduce__(self) -> tuple[type[Curve], tuple[ca.Function]]:
+        """Another process makes its own buffer."""
+        return Curve, (self._function,)
+
+
 def result(function: ca.Function, *arguments: object) -> np.ndarray:
     """The first result of :func:`called`."""
     return called(function, *arguments)[0]

@@ -164,16 +164,14 @@ class DeadZone(Effect):
         below = ca.fmin(offset_v + w, 0.0) * (below_v / (below_v - w))
         return entering + (above + below - offset_v)  # exactly the value where there is no zone
 
-    def undo(self, wanted_v: float) -> float:
+    def undo(self, wanted_v: Expression) -> Expression:
         """The command that comes out as ``wanted_v``: what a controller sends to jump the band."""
         offset_v, w = wanted_v - self.neutral_v, self.half_width_v
         above_v, below_v = self.full_v - self.neutral_v, self.neutral_v
-        centre_v = self.neutral_v + self.shift_v
-        if offset_v > 0:
-            return float(centre_v + w + offset_v * (above_v - w) / above_v)
-        if offset_v < 0:
-            return float(centre_v - w + offset_v * (below_v - w) / below_v)
-        return float(centre_v)
+        above = w + offset_v * (above_v - w) / above_v
+        below = -w + offset_v * (below_v - w) / below_v
+        jumped_v = ca.if_else(offset_v > 0, above, ca.if_else(offset_v < 0, below, 0.0))
+        return self.neutral_v + self.shift_v + jumped_v
 
 
 @dataclass(frozen=True, kw_only=True)
