@@ -10,6 +10,7 @@ above LQ and LQ above PD; physics.md 7, case 4.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -18,8 +19,10 @@ from controllers.design_file import design
 from controllers.switched_feedback import averaged, switched_lq, switched_pd
 from linearize.standard import shift_modes
 from studies.checking import drawn, styled_figures
+from studies.kept import Kept, Row
 from studies.shift_check import SHIFTS, Shift, ShiftCheck, check_shifts, shift_table
 from studies.study import Claim, Extent, Outcome, Study
+from studies.workers import Workers
 from workbench.contracts import Controller
 from workbench.plant import Plant
 from workbench.plants.gearbox import gearbox
@@ -33,7 +36,7 @@ HYBRID, PD, LQ, SCHEDULED = "hybrid MPC", "PD", "LQ", "scheduled LQ"
 
 
 def run(folder: Path, extent: Extent, say: Callable[[str], None]) -> Outcome:
-    """All of it, anew at every call; nothing is kept in ``folder``."""
+    """All of it; draws are kept in ``folder``, and a second start goes on with the rest."""
     say("designs side by side")
     beside = check_shifts(gearbox(), designs(gearbox()), SHIFTS)
     supplies = {}
@@ -41,7 +44,7 @@ def run(folder: Path, extent: Extent, say: Callable[[str], None]) -> Outcome:
         say(f"supply of {1e-5 * supply_pa:g} bar")
         plant = gearbox().with_values({SUPPLY: supply_pa})
         supplies[supply_pa] = check_shifts(plant, {HYBRID: hybrid(plant)}, SHIFTS).rows
-    rows = [row for k in range(DRAWS[extent]) for row in _draw(k, say)]
+    rows = _drawn_rows(Kept(folder / "work" / "rows.jsonl"), DRAWS[extent], say)
     text = "\n\n".join(
         [
             shift_table(beside.rows),
@@ -81,13 +84,28 @@ def hybrid(plant: Plant) -> Controller:
     return design("hybrid-mpc", plant).controller
 
 
-def _draw(number: int, say: Callable[[str], None]) -> tuple[Shift, ...]:
-    say(f"draw {number + 1}")
+def _drawn_rows(kept: Kept, number: int, say: Callable[[str], None]) -> list[Shift]:
+    """The shifts of all designs on so many drawn plants; what is kept is not run again."""
+    pieces = {f"draw {k + 1}": k for k in range(number)}
+    found = Workers(1).keep(
+        kept, _draw, pieces, lambda done, of: say(f"{done} of {of} drawn plants")
+    )
+    return [Shift(**row) for each in found for row in each["shifts"]]
+
+
+def _draw(number: int) -> Row:
+    """All four shifts of every design on the plant of a draw, which no design knows."""
     plant = gearbox()
     truth = drawn(default_rig(plant), np.random.default_rng(FIRST_SEED + number))
-    made = {f"{HYBRID} {number + 1}": hybrid(plant)}
-    made |= {f"{name} {number + 1}": found for name, found in rivals(plant).items()}
-    return check_shifts(truth, made, SHIFTS, believed=plant, seed=number).rows
+    made = {f"{name} {number + 1}": found for name, found in _compared().items()}
+    rows = check_shifts(truth, made, SHIFTS, believed=plant, seed=number).rows
+    return {"shifts": [vars(row) for row in rows]}
+
+
+@cache
+def _compared() -> dict[str, Controller]:
+    """Hybrid MPC and the designs that the follow-ups rank, made once for all draws."""
+    return {HYBRID: hybrid(gearbox()), **rivals(gearbox())}
 
 
 def _of(rows: Iterable[Shift], name: str) -> list[Shift]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from studies import (
+    control_speed_study,
     controllers_study,
     delay_study,
     estimators_study,
@@ -31,6 +32,7 @@ from studies.study import Study
 STUDIES: dict[str, Study] = {
     study.name: study
     for study in (
+        control_speed_study.STUDY,
         controllers_study.STUDY,
         delay_study.STUDY,
         gear_shift_study.STUDY,
