@@ -23,6 +23,7 @@ from workbench.errors import Message, UnknownNameError, listed, nearest, whole_f
 from workbench.plant import Plant
 from workbench.plant_files import as_it_came, plant_named, plant_text
 from workbench.rig_laws import laws_of, with_laws
+from workbench.rig_text import quoted
 from workbench.units import suffix
 
 
@@ -129,12 +130,16 @@ def _table(name: str, spec: Any) -> Iterator[str]:
     inside = []
     for f in fields(spec):
         value = getattr(spec, f.name)
-        if is_dataclass(value):
+        if is_dataclass(value) or isinstance(value, Mapping):
             inside.append((f"{name}.{f.name}", value))
         else:
             yield f"{f.name} = {value!r}"
     for key, value in inside:
-        yield from _table(key, value)
+        if is_dataclass(value):
+            yield from _table(key, value)
+        else:
+            yield f"\n[{key}]"
+            yield from (f"{quoted(mode)} = {quoted(kind.value)}" for mode, kind in value.items())
 
 
 def gains(controller: Controller) -> Iterator[tuple[str, str]]:

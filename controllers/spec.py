@@ -1,12 +1,14 @@
 """Specifications: frozen dataclasses of numbers, each with the range in which it makes sense.
 
-A number is finite and above zero unless its field says otherwise by :func:`ranged`.
+A number is finite and above zero unless its field says otherwise by :func:`ranged`.  What is no
+number is one of a few named things for each mode: see :func:`chosen`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import Field, dataclass, field, fields, is_dataclass
+from enum import Enum
 from math import inf, isfinite
 from typing import Any
 
@@ -34,6 +36,11 @@ class Range:
 def ranged(default: float, *, least: float = 0.0, most: float = inf, above: bool = False) -> Any:
     """A number of a specification with a range of its own."""
     return field(default=default, metadata={"range": Range(least, most, above)})
+
+
+def chosen(kinds: type[Enum]) -> Any:
+    """A choice of one of these for each mode by its name; none is made by default."""
+    return field(default_factory=dict, metadata={"kinds": kinds})
 
 
 def replaced(spec: Any, numbers: object, where: str) -> Any:
@@ -64,11 +71,29 @@ def _replaced(spec: Any, numbers: object, where: str) -> tuple[Any, list[Message
         elif is_dataclass(values[key]):
             values[key], more = _replaced(values[key], value, inside)
             wrong += more
+        elif kinds := known[key].metadata.get("kinds"):
+            values[key], more = _choices(kinds, value, inside)
+            wrong += more
         elif expected := _refused(known[key], values[key], value):
             wrong.append(Message(f"is {value!r}", inside, expected))
         else:
             values[key] = type(values[key])(value)
     return (spec if wrong else type(spec)(**values)), wrong
+
+
+def _choices(
+    kinds: type[Enum], choices: object, where: str
+) -> tuple[dict[str, Enum], list[Message]]:
+    """Choices by the name of a mode, and what is wrong with them."""
+    known = {kind.value: kind for kind in kinds}
+    if not isinstance(choices, Mapping):
+        return {}, [Message(f"{choices!r} is no table", where, f"by mode, {listed(known)}")]
+    wrong = [
+        Message(f"is {value!r}", f"{where}.{name}", listed(known), nearest(str(value), known))
+        for name, value in choices.items()
+        if value not in known
+    ]
+    return {name: known[value] for name, value in choices.items() if value in known}, wrong
 
 
 def _refused(known: Field, default: float, value: object) -> str:

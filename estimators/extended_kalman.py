@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from estimators.stochastic_plant import StochasticPlant
+from estimators.stochastic_plant import LIKELY, StochasticPlant
 from workbench.contracts import Estimate
 from workbench.filter_update import FilterUpdate
 from workbench.filtering import consistent_start
@@ -19,7 +20,7 @@ class ExtendedKalman(StochasticPlant):
     """Predict with the plant, correct with its Jacobian; see :class:`PlantFilter`.
 
     The notes hold the normalised innovation squared of a sample, ``nis``, of as many degrees of
-    freedom as outputs were ``received``, and each unknown input.
+    freedom as outputs were ``received``, its log-likelihood, and each unknown input.
     """
 
     def start(self, measurement: np.ndarray) -> Estimate:
@@ -34,6 +35,7 @@ class ExtendedKalman(StochasticPlant):
         y = np.where(received, measurement, 0.0)
         now = self.sample(*last.memory, command, y, received)
         notes = self._unknown(now.X) | {"nis": now.nis, "received": float(received.sum())}
+        notes[LIKELY] = now.log_likelihood
         memory = (now.X, now.P)
         return Estimate(self.plant.model.states, now.state, now.covariance, memory, notes)
 
@@ -51,12 +53,18 @@ class ExtendedKalman(StochasticPlant):
         values = zip(self.unknown_inputs, X[n:] * scale[n:], strict=True)
         return {f"unknown {name}": value for name, value in values}
 
+    def retuned(self, process_noise: Mapping[str, float]) -> ExtendedKalman:
+        """The same with other process noise, on functions that are there already."""
+        other = replace(self, process_noise=process_noise)
+        other.__dict__["sample"] = self.sample.retuned(process_noise)
+        return other
+
     @cached_property
     def sample(self) -> FilterUpdate:
         """Predict and correct as one call."""
-        return FilterUpdate(self.filter)
+        return FilterUpdate(PlantFilter(**self.assumed))
 
-    @cached_property
+    @property
     def filter(self) -> PlantFilter:
         """The filter whose functions are called."""
-        return PlantFilter(**self.assumed)
+        return self.sample.filter

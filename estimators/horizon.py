@@ -80,6 +80,7 @@ class Horizon:
             "y": (n_y, M),
             "received": (n_y, M),
             "u": (len(self.found.plant.commands), M),
+            "held": (self.at.hold.numel_out(0), M),
             "moved": (1, M - 1),
         }
 
@@ -105,7 +106,9 @@ class Horizon:
         for name, value in filled.items():
             part = self.part(tape, name)
             part[:] = np.tile(value, part.shape[1] // value.shape[1])
-        self.part(tape, "u")[:] = self.found.plant.nominal[0][:, None]
+        u, d, p = self.found.plant.nominal
+        self.part(tape, "u")[:] = u[:, None]
+        self.part(tape, "held")[:] = self.at.hold(u, d, p).full()
         return tape
 
     @property
@@ -175,11 +178,13 @@ class Horizon:
         """Shifted by a sample, the newest node where the last path leads."""
         old, n, n_y = self._parts(tape), self.at.n, self.at.n_y
         u, y, received = news[: -2 * n_y], news[-2 * n_y : -n_y], news[-n_y:]
-        X, F = self.at.advance(old["points"][:, -1], ca.MX(2 * n, 1), 1.0, u, d, p)
+        held = self.at.hold(u, d, p)
+        X, F = self.at.advance(old["points"][:, -1], ca.MX(2 * n, 1), 1.0, u, held, d, p)
         expected, H = self.at.see(X, u, d, p)
-        new = dict(points=X, expected=expected, H=H, y=y, received=received, u=u)
+        new = dict(points=X, expected=expected, H=H, y=y, received=received, u=u, held=held)
         new |= dict(noise=ca.MX(2 * n, 1), F=F, moved=ca.MX(1.0))
-        old["u"] = ca.horzcat(old["u"][:, :-1], u)  # held from the last node to the new one
+        for name, value in (("u", u), ("held", held)):  # from the last node to the new one
+            old[name] = ca.horzcat(old[name][:, :-1], value)
         shifted = {k: ca.horzcat(old[k][:, v.shape[1] :], v) for k, v in new.items()}
         prior = self._arrived(old)
         return shifted | dict(prior=prior, handed=prior)
@@ -225,7 +230,7 @@ class Horizon:
         M, first = self.nodes, now["points"][:, 0]
         many = (ca.repmat(d, 1, M), ca.repmat(p, 1, M))
         later, F = self.at.advance.mapaccum("advance", M - 1, 1)(
-            first, now["noise"], now["moved"], *map(self._first, (now["u"], *many))
+            first, now["noise"], now["moved"], *map(self._first, (now["u"], now["held"], *many))
         )
         points = ca.horzcat(first, later)
         expected, H = self.at.see.map(M)(points, now["u"], *many)

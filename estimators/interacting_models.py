@@ -17,16 +17,16 @@ Markovian switching coefficients"; Bar-Shalom, Li and Kirubarajan 2001, Sec. 11.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from estimators.extended_kalman import ExtendedKalman
-from estimators.regimes import regimes
-from estimators.stochastic_plant import StochasticPlant
+from estimators.regimes import Regime, regimes
+from estimators.stochastic_plant import LIKELY, StochasticPlant
 from workbench.contracts import Estimate
-from workbench.plant import Plant
 
 PROBABILITY = "probability of "
 
@@ -56,8 +56,8 @@ def combined(X: np.ndarray, P: np.ndarray, weights: np.ndarray) -> tuple[np.ndar
 class InteractingModels(StochasticPlant):
     """One extended filter per regime of the plant, and how likely each regime is.
 
-    The notes hold the probability of each regime.  Noise of states that the regimes leave out is
-    passed over.
+    The notes hold the probability of each regime, the log-likelihood of a sample under all of them,
+    and ``nis`` of the likeliest.  Noise of states that the regimes leave out is passed over.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class InteractingModels(StochasticPlant):
     def start(self, measurement: np.ndarray) -> Estimate:
         begun = [member.start(measurement) for member in self.members.values()]
         X, P = (np.array([e.memory[k] for e in begun]) for k in (0, 1))
-        return self._estimate(X, P, np.full(len(begun), -np.log(len(begun))))
+        return self._estimate(X, P, np.full(len(begun), -np.log(len(begun))), {})
 
     def update(self, last: Estimate, command: np.ndarray, measurement: np.ndarray) -> Estimate:
         received = np.isfinite(measurement)
@@ -85,20 +85,34 @@ class InteractingModels(StochasticPlant):
         log_odds = np.where(np.isfinite(log_odds), log_odds, -np.inf)
         if not np.isfinite(log_odds).any():
             raise ArithmeticError(f"{self.plant.name}: no regime has a finite likelihood")
-        log_odds -= np.logaddexp.reduce(log_odds)
+        likely = float(np.logaddexp.reduce(log_odds))
+        log_odds -= likely
         lost = ~np.isfinite(log_odds)
         best = int(np.argmax(log_odds))
         X, P = (np.array([getattr(each, name) for each in found]) for name in "XP")
         X[lost], P[lost] = X[best], P[best]
-        return self._estimate(X, P, np.maximum(log_odds, LEAST))
+        told = {LIKELY: likely, "nis": found[best].nis, "received": float(received.sum())}
+        return self._estimate(X, P, np.maximum(log_odds, LEAST), told)
 
-    def _estimate(self, X: np.ndarray, P: np.ndarray, log_odds: np.ndarray) -> Estimate:
+    def _estimate(
+        self, X: np.ndarray, P: np.ndarray, log_odds: np.ndarray, told: Mapping[str, float]
+    ) -> Estimate:
         odds = np.exp(log_odds)
         found = next(iter(self.members.values())).estimate(*combined(X, P, odds / odds.sum()))
         notes = {PROBABILITY + name: float(p) for name, p in zip(self.members, odds, strict=True)}
+        memory = (X, P, log_odds)
         return Estimate(
-            found.names, found.state, found.covariance, (X, P, log_odds), {**found.notes, **notes}
+            found.names, found.state, found.covariance, memory, {**found.notes, **notes, **told}
         )
+
+    def retuned(self, process_noise: Mapping[str, float]) -> InteractingModels:
+        """The same with other process noise, on functions that are there already."""
+        other = replace(self, process_noise=process_noise)
+        other.__dict__["members"] = {
+            name: member.retuned(other._noise_of(member.plant))
+            for name, member in self.members.items()
+        }
+        return other
 
     @cached_property
     def transition(self) -> np.ndarray:
@@ -116,20 +130,24 @@ class InteractingModels(StochasticPlant):
         """The filter of each regime."""
         return {name: self._member(plant) for name, plant in regimes(self.plant).items()}
 
-    def _member(self, plant: Plant) -> ExtendedKalman:
-        states, held = plant.model.states, dict(plant.held)
-        sizes = dict(zip(states, plant.scale, strict=True))
-        still = {*held, *held.values()}
-        noise = {n: q for n, q in self.process_noise.items() if n in states and n not in still}
-        noise |= {position: self.creep * sizes[position] for position in held}
+    def _member(self, plant: Regime) -> ExtendedKalman:
+        states = plant.model.states
         return ExtendedKalman(
             plant=plant,
             sample_time_s=self.sample_time_s,
             measurement_noise=self.measurement_noise,
-            process_noise=noise,
+            process_noise=self._noise_of(plant),
             unknown_inputs=self.unknown_inputs,
             initial_deviation={n: s for n, s in self.initial_deviation.items() if n in states},
         )
+
+    def _noise_of(self, plant: Regime) -> dict[str, float]:
+        """Process noise of a regime: what is held creeps, and is not pushed."""
+        states, held = plant.model.states, dict(plant.held)
+        sizes = dict(zip(states, plant.scale, strict=True))
+        still = {*held, *held.values()}
+        noise = {n: q for n, q in self.process_noise.items() if n in states and n not in still}
+        return noise | {position: self.creep * sizes[position] for position in held}
 
 
 LEAST = -700.0  # logarithm of odds below which a regime is as good as out, and must come back

@@ -3,14 +3,16 @@
 A regime is the plant itself on fewer states, with some of them held or with a command put in place
 of what is sent.  All regimes of a plant have the same states, so that estimates can be mixed.
 
-What sticks has its velocity decay within a fraction of a sample, and its position stays.  What
-slides does so in one direction, with the friction of sliding down to rest: a friction law that goes
-through zero at rest would stick by itself, and neither regime would be more likely.  A bristle
-and the dynamics of a valve are left out, by :class:`linearize.reduction.DesignModel`: what they do
-within milliseconds is what the switch between regimes stands for.  Left in, each regime could
-follow the other one.
+What sticks has its velocity decay within a fraction of a sample, and its position stays; on a
+bristle it swings, and the bristle never yields.  What slides does so in one direction, with the
+friction of sliding down to rest: a friction law that goes through zero at rest would stick by
+itself, and neither regime would be more likely.  Its bristle is bent as far as sliding bends it,
+from where it springs back when the slide sticks.  The dynamics of a valve are left out, by
+:class:`linearize.reduction.DesignModel`: what they do within milliseconds is what the switch
+between regimes stands for.  Left in, each regime could follow the other one.
 
-Source: Karnopp 1985 (zero velocity as a mode of its own); physics.md 4.2 and 4.3.
+Source: Karnopp 1985 (zero velocity as a mode of its own); Dupont et al. 2002, "Single state
+elastoplastic friction models" (presliding without loss: alpha = 0); physics.md 4.2 and 4.3.
 """
 
 from __future__ import annotations
@@ -29,12 +31,13 @@ from linearize.axis import Travel
 from linearize.reduction import DesignModel, closed_command, design_model
 from linearize.shift_modes import ShiftPoints, valve_cut
 from workbench.effect import State
+from workbench.effects.bristle_friction import BristleFriction, LuGre
 from workbench.effects.solenoid_valve import SolenoidValve
 from workbench.effects.valve_command import DeadZone
 from workbench.model import Model
 from workbench.plant import Plant
 
-STANDS_S = 1e-4  # in which what is held comes to rest
+STANDS_S = 1e-4  # in which what is held comes to rest, and a bristle is bent
 FASTER = 5.0  # times the speed of rest: there friction is that of sliding
 
 
@@ -50,6 +53,8 @@ class Regime(Plant):
         Positions and their velocities that stand still.
     sliding
         Least speed that friction sees of a velocity, with the sign of its direction.
+    bent
+        (deflection, velocity, speed) of bristles: each sees that speed in place of the velocity.
     sent
         Commands as they are in it, whatever is sent.
     """
@@ -57,6 +62,7 @@ class Regime(Plant):
     design: DesignModel
     held: tuple[tuple[str, str], ...] = ()
     sliding: Mapping[str, float] = field(default_factory=dict)
+    bent: tuple[tuple[str, str, float], ...] = ()
     sent: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -78,6 +84,9 @@ class Regime(Plant):
             k = names.index(velocity)
             faster = ca.fmax(x[k], least) if least > 0.0 else ca.fmin(x[k], least)
             rates[k] = ca.substitute(rates[k], x[k], faster)
+        for deflection, velocity, speed in self.bent:
+            k = names.index(deflection)
+            rates[k] = ca.substitute(rates[k], x[names.index(velocity)], speed)
         for position, velocity in self.held:
             rates[names.index(position)] = 0.0
             rates[names.index(velocity)] = -x[names.index(velocity)] / STANDS_S
@@ -115,30 +124,66 @@ def _by_travel(travels: Callable[[Plant], tuple[Travel, ...]]) -> Callable:
     """Each of what moves slides down, sticks or slides up, by itself."""
 
     def of(plant: Plant) -> Iterator[tuple[str, Regime]]:
-        design = _without_bristle(plant)
+        design = _as_sent(plant)
         several = travels(plant)
+        bristles = {each.velocity: _bristle(plant, each.velocity) for each in several}
         for cuts in product(*(each.friction_cut() for each in several)):
-            held, sliding = [], {}
+            held, sliding, bent, plastic = [], {}, [], {}
             for each, interval in zip(several, cuts, strict=True):
-                if interval.holds:
+                bristle, way = bristles[each.velocity], float(np.sign(interval.point))
+                if way:
+                    sliding[each.velocity] = way * FASTER * each.resting
+                if bristle and way:
+                    speed = way * float(bristle.breakaway_deflection_m) / STANDS_S
+                    bent.append((f"{bristle.name}.deflection_m", each.velocity, speed))
+                    plastic[bristle.name] = dict(plasticity=LuGre(), presliding_share=0.0)
+                elif bristle:
+                    plastic[bristle.name] = dict(plasticity=Elastic())
+                elif not way:
                     held.append((each.position, each.velocity))
-                else:
-                    sliding[each.velocity] = np.sign(interval.point) * FASTER * each.resting
             label = " ".join(interval.label for interval in cuts)
-            yield label, _regime(design, held=tuple(held), sliding=sliding)
+            what = dict(held=tuple(held), sliding=sliding, bent=tuple(bent))
+            yield label, _regime(_with_bristles(design, plastic), **what)
 
     return of
 
 
-def _without_bristle(plant: Plant) -> DesignModel:
-    """The design model with its gas masses and behind its dead zone, as commands are sent."""
+class Elastic:
+    """A bristle that never yields: alpha = 0."""
+
+    def __call__(self, deflection: Any, velocity: Any, limit: Any) -> float:
+        return 0.0
+
+
+def _bristle(plant: Plant, velocity: str) -> BristleFriction | None:
+    """The bristle that what moves with this velocity bends, if any."""
+    model = plant.model
+    for each in (m for m in plant.members if isinstance(m, BristleFriction)):
+        k = model.states.index(f"{each.name}.deflection_m")
+        if ca.depends_on(model.rates[k], model.symbols[0][model.states.index(velocity)]):
+            return each
+    return None
+
+
+def _with_bristles(design: DesignModel, plastic: Mapping[str, Mapping[str, Any]]) -> DesignModel:
+    """The design with friction of other plasticity, by name, and other shares of the bristle."""
+    effects = tuple(replace(e, **plastic.get(e.name, {})) for e in design.plant.effects)
+    return replace(design, plant=replace(design.plant, effects=effects))
+
+
+def _as_sent(plant: Plant) -> DesignModel:
+    """The design model with its gas masses and bristles, behind its dead zone: as commands are."""
     design = design_model(plant)
-    widths = {
+    values = {
         f"{e.name}.half_width_v": e.half_width_v for e in plant.effects if isinstance(e, DeadZone)
+    } | {
+        f"{e.name}.presliding_share": e.presliding_share
+        for e in plant.effects
+        if isinstance(e, BristleFriction)
     }
-    masses = {name for name in plant.model.states if name.endswith(".mass_kg")}
-    kept = tuple(n for n in plant.model.states if n in masses or n in design.states)
-    return replace(design, plant=design.plant.with_values(widths), states=kept)
+    ends = (".mass_kg", ".deflection_m")
+    kept = tuple(n for n in plant.model.states if n.endswith(ends) or n in design.states)
+    return replace(design, plant=design.plant.with_values(values), states=kept)
 
 
 def _gearbox(plant: Plant) -> Iterator[tuple[str, Regime]]:

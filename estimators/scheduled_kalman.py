@@ -18,10 +18,11 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
+from estimators.stochastic_plant import LIKELY
 from linearize.holding import whole_point
 from linearize.hybrid_simulation import SampledHybrid, sampled_hybrid
 from linearize.modes import HybridModel, hybrid_modes
-from linearize.shift_modes import switched_modes
+from linearize.shift_modes import resting_modes
 from linearize.standard import STANDARD_MODES
 from workbench.contracts import Estimate
 from workbench.filtering import consistent_start, correct, predict
@@ -55,7 +56,7 @@ def noise_for(
 
 @dataclass(frozen=True, kw_only=True)
 class ScheduledKalman:
-    """See the module; the notes hold the index of the mode.
+    """See the module; the notes hold the index of the mode, ``nis`` and log-likelihood of a sample.
 
     Attributes
     ----------
@@ -83,33 +84,57 @@ class ScheduledKalman:
         x = consistent_start(self.plant, known)[[states.index(name) for name in model.states]]
         sizes = zip(model.states, model.scale, strict=True)
         relative = [self.initial_deviation.get(name, size) / size for name, size in sizes]
-        return self._estimate(x, np.diag(np.square(relative)), -1)
+        return self._estimate(x, np.diag(np.square(relative)), {"mode": -1.0})
 
     def update(self, last: Estimate, command: np.ndarray, measurement: np.ndarray) -> Estimate:
         x, P = last.state, last.memory
-        z = np.concatenate([x, self._behind(x, command).full().ravel(), [1.0]])
-        k = self._mode_at(z)
+        z = self._row(x, command)
+        k = self._active(z)
         n, size, Q = len(x), self.sampled.hybrid.model.scale, self._step_covariance
         step = self.sampled.steps[k]
-        later = self.sampled.stopped(x[None], (step @ z)[None])[0]
+        later = self.sampled.stopped(x[None], (step @ z)[None])
+        later = self.sampled.jumped(x[None], later)[0]
         F = step[:, :n] * size / size[:, None]
         _, P = predict(x / size, P + Q / 2, F, Q / 2)
         C, offset = self._seen[k]
         behind = self._behind(later, command).full().ravel()
         e = (measurement - C @ np.concatenate([later, behind]) - offset) / self._noise
         H = C[:, :n] * size / self._noise[:, None]
+        told = {"mode": float(k)} | self._likely(e, H @ P @ H.T + np.eye(len(e)))
         X, P = correct(later / size, P, e, H, np.eye(len(e)))
-        return self._estimate(X * size, P, k)
+        return self._estimate(X * size, P, told)
 
-    def _mode_at(self, z: np.ndarray) -> int:
+    def _likely(self, e: np.ndarray, S: np.ndarray) -> dict[str, float]:
+        """What is told of an innovation in units of the noise, with covariance S."""
+        there = np.isfinite(e)
+        e, S, noise = e[there], S[np.ix_(there, there)], self._noise[there]
+        nis = float(e @ np.linalg.solve(S, e))
+        likely = -0.5 * (nis + np.linalg.slogdet(S)[1] + np.log(2.0 * np.pi * noise**2).sum())
+        return {"nis": nis, "received": float(there.sum()), LIKELY: float(likely)}
+
+    def retuned(self, process_noise: Mapping[str, float]) -> ScheduledKalman:
+        """The same with other process noise, on the modes that are there already."""
+        other = replace(self, process_noise=process_noise)
+        for name in ("sampled", "_behind", "_seen"):
+            other.__dict__[name] = getattr(self, name)
+        return other
+
+    def mode_at(self, x: np.ndarray, command: np.ndarray) -> int:
+        """Index of the mode at a state of the modes under a command as sent."""
+        return self._active(self._row(x, command))
+
+    def _row(self, x: np.ndarray, command: np.ndarray) -> np.ndarray:
+        return np.concatenate([x, self._behind(x, command).full().ravel(), [1.0]])
+
+    def _active(self, z: np.ndarray) -> int:
         if not self.mode:
             return int(self.sampled.active(z[None])[0])
         return [m.name for m in self.sampled.hybrid.modes].index(self.mode)
 
-    def _estimate(self, x: np.ndarray, P: np.ndarray, k: int) -> Estimate:
+    def _estimate(self, x: np.ndarray, P: np.ndarray, told: Mapping[str, float]) -> Estimate:
         model = self.sampled.hybrid.model
         covariance = P * np.outer(model.scale, model.scale)
-        return Estimate(model.states, x, covariance, P, {"mode": float(k)})
+        return Estimate(model.states, x, covariance, P, told)
 
     @cached_property
     def sampled(self) -> SampledHybrid:
@@ -159,10 +184,10 @@ class ScheduledKalman:
 def standard_bank(plant: Plant) -> HybridModel:
     """The plant's standard modes under its own commands; where it has none, one at its start.
 
-    Those of the gearbox have the valves' flows as inputs, which no computer knows: the switched
-    ones take their place.
+    Those of the gearbox have the valves' flows as inputs, which no computer knows: those with the
+    commands take their place, and those in which contacts hold the piston.
     """
     if plant.name == "gearbox":
-        return switched_modes(plant)
+        return resting_modes(plant)
     known = STANDARD_MODES.get(plant.name)
     return known(plant) if known else hybrid_modes(plant, {})

@@ -8,6 +8,8 @@ from typing import Any
 
 from workbench.plant import Plant
 
+LIKELY = "log-likelihood"  # of a sample's outputs, among the notes of an estimate
+
 
 @dataclass(frozen=True, kw_only=True)
 class StochasticPlant:

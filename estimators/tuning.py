@@ -4,7 +4,8 @@ The states fall into groups: what momentum gains (speeds), what gas gains (press
 and the rest.  Each group has one factor on its standard deviations, and the factors are searched
 one after the other on a logarithmic grid that narrows, all tries of a round side by side.  The
 likelihood is that of the innovations of the extended filter, which are the prediction errors that
-the noise has to explain.
+the noise has to explain; :func:`own_noise` takes those of an estimator itself, which may have left
+out a part of the plant that its noise must make up for.
 
 Source: Mehra 1970, "On the identification of variances and adaptive Kalman filtering"; Ljung 1999,
 "System identification", Sec. 7.4 (likelihood by innovations).
@@ -14,9 +15,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from math import inf
+from typing import Any
 
 import numpy as np
 
+from estimators.interacting_models import InteractingModels
+from estimators.scheduled_kalman import ScheduledKalman
+from estimators.stochastic_plant import LIKELY
 from workbench.filter_likelihoods import log_likelihoods_of_noise
 from workbench.filter_passes import recording_filter
 from workbench.plant import Plant
@@ -63,21 +69,82 @@ def tuned_noise(
         process_noise=process_noise,
         initial_deviation=initial_deviation,
     )
+
+    def likelihoods(several: np.ndarray) -> np.ndarray:
+        return log_likelihoods_of_noise(found, recording, several)
+
+    return _searched(plant, process_noise, likelihoods, say)
+
+
+def suited(
+    estimator: Any,
+    commands: np.ndarray,
+    measured: np.ndarray,
+    say: Callable[[str], None] = lambda message: None,
+) -> Any:
+    """The estimator, with its :func:`own_noise` where it has left out a part of the plant."""
+    if not isinstance(estimator, ScheduledKalman | InteractingModels):
+        return estimator
+    return estimator.retuned(own_noise(estimator, commands, measured, say).process_noise)
+
+
+def own_noise(
+    estimator: Any,
+    commands: np.ndarray,
+    measured: np.ndarray,
+    say: Callable[[str], None] = lambda message: None,
+) -> TunedNoise:
+    """Process noise under which an estimator finds its own innovations likeliest, from its own on.
+
+    For one that can be ``retuned`` and notes log-likelihoods; commands (n_u, n), outputs (n_y, n),
+    NaN where not received.
+
+    Raises
+    ------
+    ArithmeticError
+        If it is lost with every noise of a round.
+    """
+    states = estimator.plant.model.states
+
+    def likelihood(noise: np.ndarray) -> float:
+        named = zip(states, map(float, noise), strict=True)
+        other = estimator.retuned({n: q for n, q in named if q > 0.0})
+        estimate, total = other.start(measured[:, 0]), 0.0
+        for k in range(1, measured.shape[1]):
+            try:
+                estimate = other.update(estimate, commands[:, k - 1], measured[:, k])
+            except (ArithmeticError, RuntimeError):
+                return -inf
+            total += estimate.notes[LIKELY]
+        return total
+
+    def likelihoods(several: np.ndarray) -> np.ndarray:
+        return np.array([likelihood(noise) for noise in several])
+
+    return _searched(estimator.plant, estimator.process_noise, likelihoods, say)
+
+
+def _searched(
+    plant: Plant,
+    process_noise: Mapping[str, float],
+    likelihoods: Callable[[np.ndarray], np.ndarray],
+    say: Callable[[str], None],
+) -> TunedNoise:
+    """Group by group in narrowing rounds; ``likelihoods`` takes noise (m, n_x) and gives (m,)."""
     states = plant.model.states
     noise = np.array([process_noise.get(name, 0.0) for name in states])
     members = {group: _members(states, noise, group) for group in (*GROUPS, REST)}
     members = {group: rows for group, rows in members.items() if rows.any()}
     factors = dict.fromkeys(members, 1.0)
-    before = best = float(log_likelihoods_of_noise(found, recording, noise[None])[0])
+    before = best = float(likelihoods(noise[None])[0])
     for span in SPANS:
         for group, rows in members.items():
             tried = span ** np.linspace(-1.0, 1.0, TRIES)
-            several = np.where(rows, noise * tried[:, None], noise)
-            likely = log_likelihoods_of_noise(found, recording, several)
+            likely = likelihoods(np.where(rows, noise * tried[:, None], noise))
             if not np.isfinite(likely).any():
                 raise ArithmeticError(f"{plant.name}: no process noise has a finite likelihood")
             k = int(np.nanargmax(np.where(np.isfinite(likely), likely, np.nan)))
-            noise, best = several[k], float(likely[k])
+            noise, best = np.where(rows, noise * tried[k], noise), float(likely[k])
             factors[group] *= float(tried[k])
             say(f"process noise of {group} times {factors[group]:.3g}: {best:.1f}")
     named = zip(states, map(float, noise), strict=True)

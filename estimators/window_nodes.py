@@ -48,11 +48,12 @@ class WindowNodes:
 
     @cached_property
     def advance(self) -> ca.Function:
-        """(X, noise, moved, u, d, p) -> (X, F) one sample later.
+        """(X, noise, moved, u, held, d, p) -> (X, F) one sample later.
 
-        ``noise`` is (a, b) of :mod:`estimators.horizon`; where ``moved`` is 0, X stays and F is the
-        unit matrix.  Steps whose error is too large, as at an impact, are done again in finer ones;
-        F is then that of the extended filter, which is damped where the step's would explode.
+        ``noise`` is (a, b) of :mod:`estimators.horizon`, ``held`` what :attr:`hold` gives; where
+        ``moved`` is 0, X stays and F is the unit matrix.  Steps whose error is too large, as at an
+        impact, are done again in finer ones; F is then that of the extended filter, which is damped
+        where the step's would explode.
         """
         trial = self._trial
         symbols = [ca.MX.sym(f"i{k}", *trial.size_in(k)) for k in range(trial.n_in())]
@@ -65,9 +66,10 @@ class WindowNodes:
 
     @cached_property
     def _trial(self) -> ca.Function:
-        """(X, noise, moved, u, d, p) -> (X, F, true where no step has to be done again)."""
-        symbols, rates = self._rates
-        x, u, d, pw = symbols
+        """(X, noise, moved, u, held, d, p) -> (X, F, true where no step is to be done again)."""
+        (x, u, d, pw), _ = self._rates
+        held, _, rates = self._constant
+        symbols = (x, ca.vertcat(u, held), d, pw)
         steps = steps_of(self.found.sample_time_s, self.coarsest_s)
         n_p, n_x = len(self.found.plant.model.parameters), len(self.found.plant.scale)
         later, error = single_step(symbols, rates)(*symbols, self.found.sample_time_s / steps)
@@ -75,11 +77,11 @@ class WindowNodes:
         by = [ca.densify(ca.jacobian(later, v)) for v in (x, pw[n_p:])]
         once = ca.Function("once", [*symbols], [later, *by, small], {"cse": True})
         kind = ca.SX if steps == 1 else ca.MX  # several are a chain of calls, or the code is long
-        X, noise, moved, u, d, p, kicked = self._inputs(kind)
+        X, noise, moved, u, held, d, p, kicked = self._inputs(kind)
         real = ca.DM(self.found.scale) * kicked
         now, w, passes, carried = real[:n_x], real[n_x:, 0], 1.0, None
         for _ in range(steps):
-            now, by_x, by_w, small = once(now, u, d, ca.vertcat(p, w))
+            now, by_x, by_w, small = once(now, ca.vertcat(u, held), d, ca.vertcat(p, w))
             passes = passes * small
             if carried is None:
                 carried = ca.horzcat(by_x, by_w)
@@ -87,17 +89,18 @@ class WindowNodes:
                 carried = by_x @ carried + ca.horzcat(kind(n_x, n_x), by_w)
         return ca.Function(
             "trial",
-            [X, noise, moved, u, d, p],
+            [X, noise, moved, u, held, d, p],
             [*self._scaled(X, noise, moved, ca.vertcat(now, w), carried), passes],
             {"cse": True},
         )
 
     def _inputs(self, kind: type) -> list:
-        """Symbols X, noise, moved, u, d, p, and X with the first half of the noise."""
+        """Symbols X, noise, moved, u, held, d, p, and X with the first half of the noise."""
         n, (_, *inputs) = self.n, self.found.plant.model.symbols
         X, noise, moved = kind.sym("X", n), kind.sym("noise", 2 * n), kind.sym("moved")
         u, d, p = (kind.sym(k, s.numel()) for k, s in zip("udp", inputs, strict=True))
-        return [X, noise, moved, u, d, p, X + moved * ca.DM(self.kick) * noise[:n]]
+        held = kind.sym("held", self.hold.numel_out(0))
+        return [X, noise, moved, u, held, d, p, X + moved * ca.DM(self.kick) * noise[:n]]
 
     def _scaled(self, X, noise, moved, later, slopes) -> list:
         """X and F in scaled units from what follows on (x, w), and its slopes in (x, w)."""
@@ -110,9 +113,9 @@ class WindowNodes:
 
     @cached_property
     def _refined(self) -> ca.Function:
-        """(X, noise, moved, u, d, p) -> (X with as fine steps as it takes, F)."""
+        """(X, noise, moved, u, held, d, p) -> (X with as fine steps as it takes, F)."""
         n_x, S = len(self.found.plant.scale), ca.DM(self.found.scale)
-        X, noise, moved, u, d, p, kicked = self._inputs(ca.MX)
+        X, noise, moved, u, held, d, p, kicked = self._inputs(ca.MX)
         real = S * kicked
         dt, tolerances = self.found.sample_time_s, self.found.plant.model.tolerances
         step = controlled_step(*self._rates, dt, tolerances, self.coarsest_s)
@@ -120,7 +123,7 @@ class WindowNodes:
         ahead = later / S + moved * ca.DM(self.kick) * noise[self.n :]
         F = moved * self.found.transition(kicked, u, d, p) + (1.0 - moved) * ca.MX.eye(self.n)
         results = [moved * ahead + (1.0 - moved) * X, ca.densify(F)]
-        return ca.Function("refined", [X, noise, moved, u, d, p], results)
+        return ca.Function("refined", [X, noise, moved, u, held, d, p], results)
 
     @cached_property
     def see(self) -> ca.Function:
@@ -220,6 +223,27 @@ class WindowNodes:
         return np.array(
             [[float(name == w) for w in self.found.unknown_inputs] for name in names]
         ).reshape(len(names), -1)
+
+    @cached_property
+    def hold(self) -> ca.Function:
+        """(u, d, p) -> what in the rates is constant while u is held, as the opening of a valve.
+
+        It is worked out once for a node, not in every pass through the window.
+        """
+        _, *inputs = self.found.plant.model.symbols
+        return ca.Function("hold", inputs, [self._constant[1]])
+
+    @cached_property
+    def _constant(self) -> tuple[ca.SX, ca.SX, ca.SX]:
+        """Symbols for what u makes constant, its expressions in u, d and p, the rates with them."""
+        (_, u, d, _), rates = self._rates
+        inputs = ca.vertcat(u, d, self.found.plant.model.symbols[3])
+        rates, symbols, values = ca.extract_parametric(rates, inputs)
+        of_u = np.array([ca.depends_on(value, u) for value in values], dtype=bool)
+        symbols, values = (ca.vertcat(ca.SX(0, 1), *each) for each in (symbols, values))
+        rest, kept = (np.flatnonzero(chosen).tolist() for chosen in (~of_u, of_u))
+        rates = ca.substitute(rates, symbols[rest, :], values[rest, :])
+        return symbols[kept, :], values[kept, :], rates
 
     @cached_property
     def _rates(self) -> tuple[tuple[ca.SX, ...], ca.SX]:

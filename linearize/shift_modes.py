@@ -122,6 +122,18 @@ def switched_modes(
     return replace(made, jumps=picked_up(model))
 
 
+def resting_modes(plant: Plant) -> HybridModel:
+    """The eight modes with the commands of the valves, and the piston held at Neutral and the ends.
+
+    For those who follow the piston: contacts carry whatever the pressures press with.  At Neutral
+    they hold it at any speed, since what is not held there has an estimated speed that is not slow.
+    """
+    points, model = ShiftPoints(), switched_shift_model(plant)
+    placing = _placing(COMMANDS, points)
+    cuts = {**valve_cut(points), POSITION: side_cut(model)}
+    return _with_rests(plant, model, cuts, placing, neutral_guards(model)[2:])
+
+
 def driving_modes(plant: Plant) -> HybridModel:
     """Sides x {slide -, stick, slide +}, held at Neutral and at both ends, under mass flows.
 
@@ -129,8 +141,13 @@ def driving_modes(plant: Plant) -> HybridModel:
     the chambers fill and empty: see :func:`linearize.shifting.driving_model`.  What
     :func:`linearize.placement.placed_modes` begins with.
     """
-    model, placing = driving_model(plant), _at_room_temperature(plant)
-    travel = Travel(
+    model = driving_model(plant)
+    cuts = {POSITION: side_cut(model), VELOCITY: _travel(model).friction_cut()}
+    return _with_rests(plant, model, cuts, _at_room_temperature(plant), neutral_guards(model))
+
+
+def _travel(model: DesignModel) -> Travel:
+    return Travel(
         position=POSITION,
         velocity=VELOCITY,
         resting=NEUTRAL_M_S,
@@ -138,15 +155,29 @@ def driving_modes(plant: Plant) -> HybridModel:
         ends=(-_stroke_m(model), _stroke_m(model)),
     )
 
-    def made(cuts: Mapping[str, Iterable[Region]]) -> HybridModel:
-        return hybrid_modes(plant, cuts, placing, model)
 
-    (neutral,) = made({POSITION: (AT_NEUTRAL,)}).modes
-    neutral = replace(neutral, guards=neutral_guards(model))
-    ends = (made({POSITION: (end,)}) for end in stop_cut(travel))
+def _with_rests(
+    plant: Plant,
+    model: DesignModel,
+    cuts: Mapping[str, Iterable[Region]],
+    placing: Placing,
+    at_neutral: tuple[Guard, ...],
+) -> HybridModel:
+    """The modes of these cuts, and before them those in which the piston is held.
+
+    ``at_neutral`` is what the piston is held by there.
+    """
+    travel = _travel(model)
+    still = {name: cut for name, cut in cuts.items() if name != VELOCITY}
+
+    def held(region: Region) -> HybridModel:
+        return hybrid_modes(plant, still | {POSITION: (region,)}, placing, model)
+
+    neutral = [replace(mode, guards=at_neutral) for mode in held(AT_NEUTRAL).modes]
+    ends = (held(end) for end in stop_cut(travel))
     stopped = (guarded(each, travel, mode) for each in ends for mode in each.modes)
-    free = made({POSITION: side_cut(model), VELOCITY: travel.friction_cut()}).modes
-    return HybridModel(plant, model, (neutral, *stopped, *free), AT_STOPS, picked_up(model))
+    free = hybrid_modes(plant, cuts, placing, model).modes
+    return HybridModel(plant, model, (*neutral, *stopped, *free), AT_STOPS, picked_up(model))
 
 
 def _at_room_temperature(plant: Plant) -> Placing:
@@ -209,7 +240,7 @@ def held_at_neutral(model: DesignModel, points: ShiftPoints | None = None) -> Mo
 def neutral_guards(model: DesignModel) -> tuple[Guard, ...]:
     """Slow, and pushed to Neutral from both sides."""
     slow = (Guard({VELOCITY: sign}, NEUTRAL_M_S) for sign in (1.0, -1.0))
-    return (*slow, *(_push(model, sign) for sign in (-1.0, 1.0)))
+    return (*slow, _push(model, -1.0), _push(model, 1.0))
 
 
 def picked_up(model: DesignModel) -> tuple[Jump, ...]:

@@ -7,16 +7,16 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from studies.text import columns, shown
+from studies.text import columns, number, shown
 from workbench.candidate import TOGETHER
 from workbench.causes import all_causes, why_not
 from workbench.errors import InputError, Message, listed, nearest
 from workbench.plant import Plant
 from workbench.plant_files import plant_named
 from workbench.plants import PLANTS
-from workbench.rig import parameter_names
+from workbench.rig import Rig, default_rig, parameter_names
 from workbench.rig_laws import is_law, law_terms
-from workbench.units import public_name
+from workbench.units import display_scale, display_unit, public_name
 
 
 def plants_text() -> str:
@@ -67,6 +67,24 @@ def effects_of_plant_text(name: str) -> str:
         rows.append((*row, cause.source))
     head = ("effect", "null", "typical", "unit", "value", "balance", "kind", "source")
     return columns(head, rows)
+
+
+def parameters_text(name: str) -> str:
+    """One line per parameter of a plant that is not absent: value, unit, standard deviation."""
+    return rig_parameters_text(default_rig(name))
+
+
+def rig_parameters_text(rig: Rig) -> str:
+    """One line per parameter of a rig that is not absent: value, unit, standard deviation."""
+    plant, rows = rig.plant, []
+    for full, value in plant.values.items():
+        if value == plant.parameters[full].null:
+            continue
+        deviation = 0.0 if full in rig.fixed else rig.standard_deviation(full)
+        unit = display_unit(full)
+        size = number(deviation / display_scale(full).factor) if deviation > 0.0 else "-"
+        rows.append((public_name(full), shown(value, full, 6).removesuffix(f" {unit}"), size, unit))
+    return columns(("parameter", "value", "standard deviation", "unit"), rows)
 
 
 def candidate_name(plant: Plant, effect: str, at: str | None) -> str:

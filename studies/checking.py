@@ -13,6 +13,7 @@ import numpy as np
 
 from controllers.design_file import parse_design
 from estimators import ESTIMATORS
+from estimators.per_mode import names_of
 from linearize.standard import SHIFT_MODES, SLIDE_MODES
 from studies.closed_loop_check import Check, check
 from studies.closed_loop_figures import check_figures
@@ -130,8 +131,9 @@ def loops_of(
     require(chosen, there, "the list of scenarios")
     if name not in SHIFT_MODES:
         wanted = wanted or (USUAL,)
+        named = [one for choice in wanted for one in names_of(choice)]
         require(
-            wanted, (*ESTIMATORS, *((RAW,) if name in BENCHES else ())), "the list of estimators"
+            named, (*ESTIMATORS, *((RAW,) if name in BENCHES else ())), "the list of estimators"
         )
     return Loops(rig, _controllers(rig, designs), wanted, chosen)
 

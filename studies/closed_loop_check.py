@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import TypeVar
 
 import numpy as np
 
 from estimators import ESTIMATORS
 from estimators.ahead import in_time
-from estimators.scheduled_kalman import noise_for
+from estimators.per_mode import chosen_per_mode
+from estimators.scheduled_kalman import ScheduledKalman, noise_for
 from linearize.axes import stroke_m
 from linearize.standard import POSITION, PRESSURES, VELOCITY
 from studies.closed_loop_metrics import Metrics, measure, table
@@ -21,6 +23,7 @@ from workbench.errors import Message, UnknownNameError, listed, nearest
 from workbench.filtering import consistent_start
 from workbench.plant import Plant
 
+Asked = TypeVar("Asked")  # a scenario of a slide, or a task of a bench
 POSITION_NOISE_M, POSITION_GRID_M, PRESSURE_NOISE_PA = 5e-6, 5e-6, 500.0
 PROCESS_NOISE = {VELOCITY: 0.1, **dict.fromkeys(PRESSURES, 1e3)}
 
@@ -61,25 +64,33 @@ def sensors(plant: Plant) -> Hardware:
 def standard_estimator(name: str, plant: Plant, sample_time_s: float) -> Estimator:
     """An estimator of the registry for the sensors and the usual process noise, made once.
 
+    ``name`` may also choose by mode, see :mod:`estimators.per_mode`.
+
     Raises
     ------
     UnknownNameError
-        If there is no such estimator.
+        If there is no such estimator, or no such mode.
     """
-    if name not in ESTIMATORS:
-        what = f"no estimator {name}; there is {listed(ESTIMATORS)}"
-        raise UnknownNameError(Message(what, nearest=nearest(name, ESTIMATORS)))
     hardware, lean = sensors(plant), plant.lean()
     coarse = {key: grid / 12**0.5 for key, grid in hardware.resolution.items()}
     noise = {key: float(np.hypot(s, coarse.get(key, 0.0))) for key, s in hardware.noise.items()}
     process = {key: size for key, size in PROCESS_NOISE.items() if key in lean.model.states}
-    found = ESTIMATORS[name](
-        plant=lean,
-        sample_time_s=sample_time_s,
-        measurement_noise=noise,
-        process_noise=noise_for(ESTIMATORS[name], lean, process),
+
+    def made(one: str) -> Estimator:
+        if one not in ESTIMATORS:
+            what = f"no estimator {one}; there is {listed(ESTIMATORS)}"
+            raise UnknownNameError(Message(what, nearest=nearest(one, ESTIMATORS)))
+        return ESTIMATORS[one](
+            plant=lean,
+            sample_time_s=sample_time_s,
+            measurement_noise=noise,
+            process_noise=noise_for(ESTIMATORS[one], lean, process),
+        )
+
+    finder = ScheduledKalman(
+        plant=lean, sample_time_s=sample_time_s, measurement_noise=noise, process_noise={}
     )
-    return in_time(found, lean)
+    return in_time(chosen_per_mode(name, finder, made), lean)
 
 
 def check(
@@ -103,14 +114,30 @@ def check(
     truth, model = plant.lean(), (believed or plant).lean()
     chosen = [SCENARIOS[name](stroke_m(plant)) for name in scenarios]
     rows, records = [], []
-    for design, controller in designs.items():
-        for estimator in estimators:
-            observer = standard_estimator(estimator, model, controller.sample_time_s)
-            for scenario in chosen:
-                record = run(truth, controller, observer, scenario, seed)
-                rows.append(measure(truth, record, scenario, design, estimator))
-                records.append(record)
+    every = every_loop(designs, estimators, chosen, standard_estimator, model)
+    for design, estimator, observer, scenario in every:
+        record = run(truth, designs[design], observer, scenario, seed)
+        rows.append(measure(truth, record, scenario, design, estimator))
+        records.append(record)
     return Check(tuple(rows), tuple(records))
+
+
+def every_loop(
+    designs: Mapping[str, Controller],
+    estimators: Iterable[str],
+    scenarios: Iterable[Asked],
+    made: Callable[[str, Plant, float], Estimator],
+    believed: Plant,
+) -> Iterator[tuple[str, str, Estimator, Asked]]:
+    """(design, estimator, the estimator itself, scenario) of all loops, designs outermost.
+
+    ``made`` gives an estimator by its name, the plant that it knows, and its sample time.
+    """
+    estimators, scenarios = tuple(estimators), tuple(scenarios)
+    for design, controller in designs.items():
+        for name in estimators:
+            estimator = made(name, believed, controller.sample_time_s)
+            yield from ((design, name, estimator, scenario) for scenario in scenarios)
 
 
 def run(

@@ -12,6 +12,7 @@ from linearize.axes import stroke_m
 from linearize.reduction import closed_command
 from linearize.standard import POSITION, PRESSURES, SUPPLY
 from studies.scenarios import LATE_S, SAMPLE_TIME_S, Scenario
+from studies.text import columns
 from workbench.closed_loop import LoopRecord
 from workbench.plant import Plant
 
@@ -193,11 +194,11 @@ COLUMNS = {
 def table(rows: Iterable[Metrics]) -> str:
     """The rows as text, one line each, in millimetres, milliseconds, grams and microseconds."""
     head = [*LABELS, "reached", *(label for label, _ in COLUMNS.values())]
-    lines = ["".join(f"{label:>10}" for label in head)]
+    lines = []
     for row in rows:
-        words = [f"{getattr(row, label):>10}" for label in LABELS]
-        words.append(f"{ANSWERS[row.reached]:>10}")
+        words = [getattr(row, label) for label in LABELS]
+        words.append(ANSWERS[row.reached])
         values = [(getattr(row, key) * factor) for key, (_, factor) in COLUMNS.items()]
-        words += [f"{'-' if np.isnan(value) else format(value, '.4g'):>10}" for value in values]
-        lines.append("".join(words))
-    return "\n".join(lines)
+        words += ["-" if np.isnan(value) else format(value, ".4g") for value in values]
+        lines.append(words)
+    return columns(head, lines)

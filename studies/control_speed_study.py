@@ -188,5 +188,7 @@ STUDY = Study(
     name="control-speed",
     question="how long does a whole call of each MPC take, beside rivals in the same run?",
     source="no paper: the rivals of the design reference, section on speed",
+    plants=("servo_drive", "gearbox"),
+    seeds="states at the limits: 0",
     run=lambda folder, extent, say: outcome(measured(extent, say)),
 )

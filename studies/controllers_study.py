@@ -158,4 +158,6 @@ STUDY = Study(
     question="which designs position and follow as asked, on plants that they do not know?",
     source="Zhu and Barth 2010; Bone and Ning 2007; papers 000, 001 and 004; physics.md 2",
     run=run,
+    plants=("servo_drive", "crr_rig", "crr_arm", "crr_leg", "soft_joint"),
+    seeds="draw k, from 0: 1001 + k",
 )

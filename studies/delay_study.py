@@ -19,15 +19,13 @@ import numpy as np
 
 from controllers.design_file import Design, design
 from controllers.margins import margins
-from studies.closed_loop_check import run as closed
 from studies.closed_loop_check import standard_estimator
-from studies.closed_loop_metrics import measure
 from studies.controllers_study import DESIGNS
-from studies.kept import Kept, Row
+from studies.draws import kept_rows
+from studies.kept import Row
 from studies.study import Claim, Extent, Outcome, Study
 from studies.text import columns, number
-from studies.workers import Workers
-from studies.yardsticks import Draw, draw_of, medians, sine, step
+from studies.yardsticks import Closed, Draw, draw_of, medians, sine, step
 from workbench.effects.timing import PacketPause
 from workbench.plant import Plant
 
@@ -72,15 +70,11 @@ def worked(piece: Late) -> Row:
     controller = made.controller
     estimator = standard_estimator("ekf", draw.believed, controller.sample_time_s)
     truth = _late(draw.plant, piece).lean()
-
-    def figure(scenario: Any, key: str) -> float:
-        record = closed(truth, controller, estimator, scenario, piece.number)
-        return 1e3 * float(getattr(measure(truth, record, scenario, "", ""), key))
-
+    loop = Closed(truth, controller, estimator, piece.number)
     try:
         found = {
-            CYCLE: figure(step(truth), "limit_cycle_m"),
-            TRACKING: figure(sine(truth, 0.5, 0.06), "rmse_m"),
+            CYCLE: 1e3 * loop.metrics(step(truth)).limit_cycle_m,
+            TRACKING: 1e3 * loop.metrics(sine(truth, 0.5, 0.06)).rmse_m,
         }
     except ArithmeticError:
         found = {}
@@ -115,9 +109,7 @@ def pieces(number: int) -> Iterator[Late]:
 def run(folder: Path, extent: Extent, say: Callable[[str], None]) -> Outcome:
     """Every delay and redraw with every draw; what is kept in the folder is not done again."""
     asked = {piece.key: piece for piece in pieces(DRAWS[extent])}
-    kept = Kept(folder / "work" / "rows.jsonl")
-    rows = Workers().keep(kept, worked, asked, lambda done, of: say(f"{done} of {of} loops"))
-    return outcome([*asked.values()], rows)
+    return outcome([*asked.values()], kept_rows(folder, worked, asked, say))
 
 
 def outcome(asked: Sequence[Late], rows: Sequence[Mapping[str, Any]]) -> Outcome:
@@ -200,4 +192,6 @@ STUDY = Study(
     question="how late may commands come, and how often may packets pause?",
     source="paper 001 Figs. 12 to 14 (S001-6, S001-7), asked of paper 002's drive",
     run=run,
+    plants=("servo_drive",),
+    seeds="draw k, from 0: 1001 + k",
 )

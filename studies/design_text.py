@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
 from math import degrees, isinf
 from typing import TYPE_CHECKING
 
@@ -10,6 +10,7 @@ from studies.text import columns, number
 
 if TYPE_CHECKING:
     from controllers.certificate import Certificate
+    from controllers.design_file import Design
     from controllers.hybrid_mpc import HybridMpc
     from controllers.margins import Margins
 
@@ -36,6 +37,26 @@ NO_LAWS = (
     "says what the whole plant makes of it"
 )
 MOST_PAIRS = 6  # that are named
+
+
+def design_texts(found: Design, say: Callable[[str], None]) -> Iterator[str]:
+    """What is known of a design: margins of each mode, and what is certified across them."""
+    from controllers.certificate import certificate
+    from controllers.margins import loops, margins, unforeseen_s
+
+    made, delay_s = found.controller, unforeseen_s(found.plant)
+    if found.method == "hybrid-mpc":
+        yield search_text(made)
+        return
+    if not hasattr(made, "laws") and not hasattr(made, "regulators"):
+        yield NO_LAWS
+        return
+    for part in getattr(made, "regulators", (made,)):
+        axis = getattr(part, "axis", None)
+        loop = (found.hybrid, part.laws, made.sample_time_s, delay_s, axis)
+        yield margins_text(margins(*loop), delay_s)
+        say("looking for a certificate across modes")
+        yield certificate_text(certificate(loops(*loop), made.sample_time_s))
 
 
 def margins_text(found: Iterable[Margins], delay_s: float = 0.0) -> str:

@@ -27,8 +27,8 @@ class Estimated:
         Share of lags at which innovations are correlated, by output, (n_y,).
     state_rmse, hidden_rmse
         By state of the plant in the simulation, and with the effect hidden in it.
-    gap_rmse
-        RMS error of each output, (n_y,), at the end of the holes of the simulation.
+    disturbed
+        RMS error of each output of the simulation, (n_y,), by what the data lack.
     simulated
         The run on the simulation.
     """
@@ -41,7 +41,7 @@ class Estimated:
     p99_s: float
     state_rmse: Mapping[str, float]
     hidden_rmse: Mapping[str, float]
-    gap_rmse: np.ndarray
+    disturbed: Mapping[str, np.ndarray]
     simulated: Followed
 
 

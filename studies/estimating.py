@@ -3,7 +3,8 @@
 On the recording itself no state is known, so what counts is how well the plant, started from an
 estimate, foretells the outputs.  Under the recorded inputs the rig's own plant is then simulated,
 with the recording's sensor noise: there every state is known, with nothing hidden, with an effect
-hidden of which the estimators know nothing, and with stretches in which nothing is received.
+hidden of which the estimators know nothing, and with data that lack something: holes, slow sensors,
+outliers, an output that is late.
 """
 
 from __future__ import annotations
@@ -18,8 +19,9 @@ import numpy as np
 from estimators import ESTIMATORS
 from estimators.observed import Observed, observed
 from estimators.scheduled_kalman import noise_for
-from estimators.tuning import TunedNoise, tuned_noise
+from estimators.tuning import TunedNoise, suited, tuned_noise
 from studies.estimated import Estimated, EstimatedRecording
+from studies.estimating_disturbed import disturbed
 from studies.estimator_runs import (
     Followed,
     fed,
@@ -40,7 +42,6 @@ from workbench.simulation import simulate
 USUAL = ("ekf", "ukf", "imm", "mhe")
 LONGEST_S = 3.0  # of a recording
 HORIZONS_S = (0.001, 0.01, 0.05, 0.1)
-GAP_S, APART_S = 0.05, 0.25  # a hole in all outputs, and from one to the next
 ASKED = 500  # innovations and starts of a prediction in a run
 SHARES = {"velocity_m_s": 0.1, "velocity_rad_s": 0.1, "pressure_pa": 0.01}  # of a state's scale
 AMONG_HIDDEN = ("constant_force", "chamber_leak")  # the first that a plant may lack
@@ -129,7 +130,7 @@ class _Bench:
             p99_s=float(np.percentile(found.took_s, 99)),
             state_rmse=self._state_rmse(simulated, self.simulated),
             hidden_rmse=self._state_rmse(hidden, self.simulated_hidden),
-            gap_rmse=self._through_gaps(estimator, u),
+            disturbed=self._disturbed(estimator, u),
             simulated=simulated,
         )
 
@@ -141,32 +142,25 @@ class _Bench:
     def _state_rmse(self, found: Followed, truth: Recording) -> dict[str, float]:
         return {name: rmse(found.state(name) - truth[name]) for name in found.names}
 
-    def _through_gaps(self, estimator: Any, u: np.ndarray) -> np.ndarray:
-        """RMS error of the outputs at the last samples of holes in the simulation, (n_y,)."""
-        dt, n = self.recording.sample_time_s, len(self.recording)
-        gap, apart = max(round(GAP_S / dt), 2), max(round(APART_S / dt), 4)
-        y = self._seen(self.simulated)
-        hole = (np.arange(n) % apart) >= apart - gap
-        y[:, hole] = np.nan
-        last = np.flatnonzero(hole[:-1] & ~hole[1:])
-        found, plant = follow(estimator, u, y, 0), estimator.plant
-        places = [(k, name) for k, name in enumerate(plant.measured) if name in found.names]
-        errors = np.full(len(plant.measured), np.nan)
-        for k, name in places:
-            errors[k] = rmse((found.state(name) - self.simulated[name])[last])
-        return errors
+    def _disturbed(self, estimator: Any, u: np.ndarray) -> dict[str, np.ndarray]:
+        """RMS error of each output of the simulation, (n_y,), by what the data lack."""
+        seen, truth = self._seen(self.simulated), self.simulated.rows(self.plant.measured)
+        noise = np.array([self.noise[name] for name in self.plant.measured])
+        return disturbed(estimator, u, seen, truth, noise, self.recording.sample_time_s)
 
     def _made(self, name: str) -> Any:
         plant = self.plant.with_inputs_commanded()
         states, size = plant.model.states, self.deviations
         noise = noise_for(ESTIMATORS[name], plant, self.tuned.process_noise)
-        return ESTIMATORS[name](
+        estimator = ESTIMATORS[name](
             plant=plant,
             sample_time_s=self.recording.sample_time_s,
             measurement_noise=self.noise,
             process_noise=noise,
             initial_deviation=dict(zip(states, size, strict=True)),
         )
+        _, u, y = fed(self.plant, self.recording)
+        return suited(estimator, u, y, self.say)
 
     @cached_property
     def observed(self) -> Observed:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,6 @@ from estimators.scheduled_kalman import noise_for
 from estimators.tuning import tuned_noise
 from studies.estimator_truths import TrueRun
 from workbench.effects.empirical import ConstantFlow
-from workbench.parts import Chamber
 from workbench.plant import Plant
 from workbench.plants.gearbox import gearbox
 from workbench.plants.servo_drive import OUTPUTS, servo_drive
@@ -43,7 +41,6 @@ AT_REST = {  # deviations of a drive that stands at room temperature
     "friction.deflection_m": 2e-5,
 }
 WARMTH_SHARE = 3e-3  # of a gas mass
-START_PA, OFF_PA = 5.6e5, 0.5e5  # of the truth, and how far off the start by the position is
 LAGS_S = np.geomspace(3e-4, 3e-2, 41)  # of the filtered derivative, among which the best is taken
 
 
@@ -144,17 +141,3 @@ def _of_lag(runs: Sequence[TrueRun], row: int, velocity: str, first: int, lag_s:
         found = lfilter([share / dt, -share / dt], [1.0, share - 1.0], y - y[0])
         errors.append((found - run.truth[velocity])[first:])
     return float(np.sqrt(np.mean(np.square(errors))))
-
-
-def position_only() -> Plant:
-    """The drive with its position alone, the disturbance among its states.
-
-    It believes both chambers to be half a bar above where they are, so that what it knows of the
-    pressures in motion is not from its start.
-    """
-    plant = disturbed_drive()
-    parts = (
-        replace(part, initial_pressure_pa=START_PA + OFF_PA) if isinstance(part, Chamber) else part
-        for part in plant.parts
-    )
-    return replace(plant, parts=tuple(parts), measured=OUTPUTS[:1])

@@ -31,6 +31,7 @@ SERVO_SAMPLES, GEARBOX_SAMPLES = 2000, 2000
 HALF_WINDOW, RESTING_M_S = 5, 1e-3  # a slide rests where it moves less than this over 10 ms
 SLIDES = ("slide -", "stick", "slide +")
 VALVES = ("1 vents 2 vents", "1 vents 2 charges", "1 charges 2 vents", "1 charges 2 charges")
+GEARBOX_PRESSURES = ("chamber_1.pressure_pa", "chamber_2.pressure_pa")
 SPOOL = ("vents", "shut", "fills")
 
 
@@ -123,12 +124,12 @@ def gearbox_runs(kind: str, count: int, folder: Path) -> list[TrueRun]:
         return dict(
             commands=sent.transpose(1, 0, 2),
             measured=np.stack(seen),
-            truth=np.stack([body[:, 0], body[:, 3]]),
+            truth=np.stack([body[:, 0], body[:, 3], *rows[:2]]),
             lifts=lifts.transpose(1, 0, 2),
         )
 
-    names = ("main_piston.position_m", "main_piston.velocity_m_s")
-    kept = _kept(folder / f"gearbox_{kind}_{count}.npz", made)
+    names = ("main_piston.position_m", "main_piston.velocity_m_s", *GEARBOX_PRESSURES)
+    kept = _kept(folder / f"gearbox_true_{kind}_{count}.npz", made)
     runs = []
     for k in range(count):
         on = (kept["lifts"][..., k] > gearbox.LIFT_M / 2).astype(int)

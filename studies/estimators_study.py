@@ -7,27 +7,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from linearize.analysis import analyse_all
-from linearize.standard import standard_modes
+from estimators.tuning import own_noise
 from studies.estimator_benches import (
     BENCHES,
-    NUMERICAL,
-    OFF_PA,
-    at_rest,
     consistent,
     derivative_rmse,
     made,
-    position_only,
     start,
     tuned,
 )
 from studies.estimator_claims import (
     ALL,
+    REDUCED,
     consistency_claims,
     consistency_text,
     courses,
@@ -40,6 +37,7 @@ from studies.estimator_claims import (
     velocity_text,
 )
 from studies.estimator_modes import modes_named
+from studies.estimator_positions import by_position_alone
 from studies.estimator_runs import follow, nees, rmse, whiteness
 from studies.estimator_truths import (
     DRAWN,
@@ -51,7 +49,6 @@ from studies.estimator_truths import (
 )
 from studies.kept import Kept
 from studies.study import Extent, Outcome, Study
-from workbench.plants.servo_drive import OUTPUTS, servo_drive
 
 JUDGED = ("ekf", "ukf", "mhe")  # for consistency; the others do not know the disturbance
 RUNS = 50
@@ -88,12 +85,15 @@ def run(folder: Path, extent: Extent, say: Callable[[str], None]) -> Outcome:
     consistency = {kind: _consistency(work, kind) for kind in (EXACT, DRAWN)}
     white = {kind: _coloured(work, kind) for kind in (EXACT, DRAWN)}
     velocity = {plant: _velocity(work, plant) for plant in VELOCITIES}
-    seen = work.piece("observability by the position", _observability)
-    alone = _position_only(work)
+    exact = {
+        "servo_drive": servo_runs(EXACT, RUNS, work.folder)[: RUNS_DRAWN[extent]],
+        "gearbox": gearbox_runs(EXACT, RUNS_OF_A_PLANT[extent], work.folder),
+    }
+    alone = by_position_alone(work.piece, exact)
     modes = modes_named(work.piece, work.folder, RUNS_OF_A_PLANT[extent], say)
     claims = (
         *velocity_claims(velocity),
-        *position_claims(seen, alone),
+        *position_claims(alone),
         *consistency_claims(consistency[EXACT]),
         *mode_claims(modes),
     )
@@ -101,7 +101,7 @@ def run(folder: Path, extent: Extent, say: Callable[[str], None]) -> Outcome:
         (
             velocity_text(velocity),
             consistency_text(consistency, white),
-            position_text(seen, alone),
+            position_text(alone),
             modes_text(modes),
         )
     )
@@ -112,7 +112,7 @@ def run(folder: Path, extent: Extent, say: Callable[[str], None]) -> Outcome:
         },
         "consistency": {k: {n: summary(r) for n, r in v.items()} for k, v in consistency.items()},
         "coloured_lags": white,
-        "position_only": {"observability": seen, "runs": alone},
+        "position_only": alone,
         "modes": modes,
     }
     from studies.figures.consistency import consistency_figure
@@ -176,11 +176,14 @@ def _velocity(work: Work, plant: str) -> dict[str, Any]:
         )["rmse"]
     }
     for name in ALL:
+        estimator = made(name, lean, noise, start(lean))
+        if name in REDUCED:
+            own = work.piece(f"noise {plant} {name}", partial(_own, estimator, first, work.say))
+            estimator = estimator.retuned(own)
         errors = [
-            work.piece(
-                f"velocity {plant} {name} {k}",
-                lambda r=r, name=name: {"rmse": _error(name, lean, noise, r, velocity)},
-            )["rmse"]
+            work.piece(f"velocity {plant} {name} {k}", partial(_error, estimator, r, velocity))[
+                "rmse"
+            ]
             for k, r in enumerate(runs)
         ]
         kept = np.array([np.nan if each is None else each for each in errors])
@@ -188,53 +191,19 @@ def _velocity(work: Work, plant: str) -> dict[str, Any]:
     return found
 
 
-def _error(
-    name: str, plant: Any, noise: Mapping[str, float], r: TrueRun, state: str
-) -> float | None:
+def _own(estimator: Any, first: TrueRun, say: Callable[[str], None]) -> dict[str, float]:
+    """Process noise under which an estimator finds the start of a run likeliest."""
+    u, y = first.commands[:, :SAMPLES], first.measured[:, :SAMPLES]
+    return dict(own_noise(estimator, u, y, say).process_noise)
+
+
+def _error(estimator: Any, r: TrueRun, state: str) -> dict[str, float | None]:
     """RMS error of a state, none where the estimator was lost."""
     try:
-        found = follow(made(name, plant, noise, start(plant)), r.commands, r.measured, 0)
+        found = follow(estimator, r.commands, r.measured, 0)
     except ArithmeticError:
-        return None
-    return rmse((found.state(state) - r.truth[state])[LATE:])
-
-
-def _observability() -> dict[str, Any]:
-    """In how many modes of the drive the position alone sees all of the state."""
-    plant = servo_drive().lean()
-    reports = analyse_all(standard_modes(plant))
-    full = [report.seen_from[OUTPUTS[0]] == len(report.poles) for report in reports]
-    stuck = [report.name for report, whole in zip(reports, full, strict=True) if not whole]
-    return {"modes": len(reports), "whole": int(sum(full)), "not": stuck}
-
-
-def _position_only(work: Work) -> list[Mapping[str, Any]]:
-    """Errors of both pressures in motion from the position alone, a row per run.
-
-    By the unscented filter: the extended one is sure of the speed of a slide that rests, puts the
-    surprise of the first break-away into the pressures, and loses half of the runs unless it is
-    told of 0.1 m/s per square root of a second.
-    """
-    plant = position_only()
-    noise = NUMERICAL | plant.process_noise
-    wide = at_rest(plant) | dict.fromkeys(OUTPUTS[1:], OFF_PA)
-    wide |= {n: 0.1 * float(s) for n, s in zip(plant.model.states, plant.initial, strict=True)
-             if n.endswith(".mass_kg")}  # fmt: skip
-    estimator = made("ukf", plant, noise, wide)
-
-    def one(r: TrueRun) -> dict[str, float]:
-        found = follow(estimator, r.commands, r.measured[:1], 0)
-        moving = counted(r.mode, AWAY) & (r.mode != 1)
-        moving[:LATE] = False
-        errors = [(found.state(name) - r.truth[name])[moving] for name in OUTPUTS[1:]]
-        return {"a": rmse(errors[0]), "b": rmse(errors[1])}
-
-    count = RUNS_DRAWN[work.extent]
-    runs = servo_runs(EXACT, RUNS, work.folder)[:count]
-    return [
-        work.piece(f"pressures by the position, ukf {k}", lambda r=r: one(r))
-        for k, r in enumerate(runs)
-    ]
+        return {"rmse": None}
+    return {"rmse": rmse((found.state(state) - r.truth[state])[LATE:])}
 
 
 STUDY = Study(
@@ -242,4 +211,6 @@ STUDY = Study(
     question="what do estimators know of velocity, pressures and modes, and do they know how well?",
     source="physics.md 2; Bar-Shalom, Li and Kirubarajan 2001, Sec. 5.4 and 11.6",
     run=run,
+    plants=("servo_drive", "gearbox"),
+    seeds="of the truth's cases, and the number of each run",
 )

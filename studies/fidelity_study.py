@@ -20,10 +20,10 @@ from typing import Any
 import numpy as np
 
 from studies.controllers_study import DESIGNS
-from studies.kept import Kept, Row
+from studies.draws import kept_rows
+from studies.kept import Row
 from studies.study import Claim, Extent, Outcome, Study
 from studies.text import columns, number
-from studies.workers import Workers
 from studies.yardsticks import FINAL, LARGE, ONE, RISE, draw_of, measured, medians
 from workbench.plant import Plant
 
@@ -35,6 +35,8 @@ FRICTION = ("friction.coulomb_force_n", "friction.stiction_excess_n")
 DEAD_VOLUMES = ("chamber_a.dead_volume_m3", "chamber_b.dead_volume_m3")
 LEAK = "valve.leak_area_m2"
 JUDGED = (LARGE, ONE, FINAL, RISE)
+WORTH = {"dead zone of the valve": LARGE, "dry friction": LARGE, "dead volumes": ONE}
+"""What is worth modelling, and the figure that says so."""
 CLEAR = 2.0  # times as large: an effect that is clearly worth modelling
 SAME = 0.1  # share of a figure that is no difference
 
@@ -78,8 +80,7 @@ def worked(piece: Poorer) -> Row:
 def run(folder: Path, extent: Extent, say: Callable[[str], None]) -> Outcome:
     """Every lack with every draw; what is kept in the folder is not done again."""
     pieces = {f"{name} {k}": Poorer(name, k) for k in range(DRAWS[extent]) for name in LACKING}
-    kept = Kept(folder / "work" / "rows.jsonl")
-    rows = Workers().keep(kept, worked, pieces, lambda done, of: say(f"{done} of {of} loops"))
+    rows = kept_rows(folder, worked, pieces, say)
     found: dict[str, list[Mapping[str, Any]]] = {name: [] for name in LACKING}
     for piece, row in zip(pieces.values(), rows, strict=True):
         found[piece.lacking].append(row["found"])
@@ -110,9 +111,9 @@ def _claims(worse: Mapping[str, Mapping[str, float]]) -> Sequence[Claim]:
         return f"{number(worse[name][mark], 3)} times as large"
 
     needed = [
-        Claim(f"{name} is worth modelling: {LARGE} without it at least {CLEAR:g} times as large",
-              told(name, LARGE), worse[name][LARGE] >= CLEAR)
-        for name in ("dead zone of the valve", "dry friction")
+        Claim(f"without {name}, {mark} is at least {CLEAR:g} times as large",
+              told(name, mark), worse[name][mark] >= CLEAR)
+        for name, mark in WORTH.items()
     ]  # fmt: skip
     heat = worse["heat of the walls"][LARGE]
     best = min(worse, key=lambda name: worse[name][LARGE])
@@ -130,4 +131,6 @@ STUDY = Study(
     question="what is each physical effect of the design model worth for control?",
     source="paper 000, value of fidelity (S000-8, S000-9), asked of paper 002's drive",
     run=run,
+    plants=("servo_drive",),
+    seeds="draw k, from 0: 1001 + k",
 )

@@ -10,7 +10,10 @@ import numpy as np
 
 from estimators import ESTIMATORS
 from estimators.ahead import in_time
+from estimators.per_mode import chosen_per_mode
 from estimators.raw import RawMeasurement
+from estimators.scheduled_kalman import ScheduledKalman
+from studies.closed_loop_check import every_loop
 from studies.closed_loop_metrics import air_used_kg
 from studies.following import BAND, BENCHES, Task, leg_of
 from studies.text import columns, number, shown
@@ -98,13 +101,14 @@ def check_followed(
     truth, model, rows, records = plant.lean(), (believed or plant).lean(), [], []
     tasks = tasks_of(believed or plant)
     require(scenarios := tuple(scenarios), tasks, "the list of scenarios")
-    for design, controller in designs.items():
-        for estimator in estimators:
-            observer = observer_of(estimator, model, controller.sample_time_s)
-            for name in scenarios:
-                record = followed(truth, controller, observer, tasks[name], seed)
-                rows.append(measured(truth, record, tasks[name], design, estimator, controller))
-                records.append(record)
+    asked = [tasks[name] for name in scenarios]
+    for design, estimator, observer, task in every_loop(
+        designs, estimators, asked, observer_of, model
+    ):
+        controller = designs[design]
+        record = followed(truth, controller, observer, task, seed)
+        rows.append(measured(truth, record, task, design, estimator, controller))
+        records.append(record)
     return FollowingCheck(tuple(rows), tuple(records))
 
 
@@ -117,22 +121,25 @@ def tasks_of(plant: Plant) -> dict[str, Task]:
 def observer_of(name: str, plant: Plant, sample_time_s: float) -> Estimator:
     """An estimator of the registry for the sensors of the plant's bench, made once; `raw` is none.
 
+    ``name`` may also choose by mode, see :mod:`estimators.per_mode`.
+
     Raises
     ------
     UnknownNameError
-        If there is no such estimator.
+        If there is no such estimator, or no such mode.
     """
-    require((name,), (*ESTIMATORS, RAW), "the list of estimators")
     if name == RAW:
         return RawMeasurement(names=plant.measured, sample_time_s=sample_time_s)
     bench = BENCHES[plant.name]
-    found = ESTIMATORS[name](
-        plant=plant,
-        sample_time_s=sample_time_s,
-        measurement_noise=bench.noise(plant),
-        process_noise=bench.process(plant),
-    )
-    return in_time(found, plant)
+    common = {"plant": plant, "sample_time_s": sample_time_s}
+    noise, process = bench.noise(plant), bench.process(plant)
+
+    def made(one: str) -> Estimator:
+        require((one,), ESTIMATORS, "the list of estimators")
+        return ESTIMATORS[one](**common, measurement_noise=noise, process_noise=process)
+
+    finder = ScheduledKalman(**common, measurement_noise=noise, process_noise={})
+    return in_time(chosen_per_mode(name, finder, made), plant)
 
 
 def followed(

@@ -22,7 +22,7 @@ from studies.checking import apart, drawn, styled_figures
 from studies.kept import Kept, Row
 from studies.shift_check import SHIFTS, Shift, ShiftCheck, check_shifts, shift_table
 from studies.study import Claim, Extent, Outcome, Study
-from studies.workers import Workers
+from studies.workers import chosen_workers
 from workbench.contracts import Controller
 from workbench.plant import Plant
 from workbench.plants.gearbox import gearbox
@@ -93,7 +93,7 @@ def _drawn_rows(
     What is kept is not run again.
     """
     pieces = {f"draw {k + 1}": k for k in range(number)}
-    found = Workers(1).keep(
+    found = chosen_workers().keep(
         kept, _draw, pieces, lambda done, of: say(f"{done} of {of} drawn plants")
     )
     shifts, known = ([Shift(**r) for each in found for r in each[k]] for k in ("shifts", "known"))
@@ -226,4 +226,6 @@ STUDY = Study(
     question="which design shifts the gearbox fast and softly at any supply, and on drawn plants?",
     source="paper 003 and Appl. Sci. 2020, 10(10), 3514",
     run=run,
+    plants=("gearbox",),
+    seeds="draw k, from 0: 1 + k",
 )

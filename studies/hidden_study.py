@@ -1,7 +1,7 @@
 """Study ``hidden-effects`` at scale: many cases, kept as they are answered, and what they say.
 
-The quick grid is one seed of every plant, the full one everything: single effects, nothing, laws
-outside the catalogue, pairs, recordings too weak to tell, and other widths of the priors.  Two
+The full grid is everything: single effects, nothing, laws outside the catalogue, pairs, recordings
+too weak to tell, and other widths of the priors.  The quick one is a sample of one seed.  Two
 processes answer; each answer is kept on disk at once, so a second start goes on where a first one
 ended.  Visible is a hidden effect whose own refit removes more than 30 % of the misfit.
 
@@ -34,7 +34,7 @@ Say = Callable[[str], None]
 
 def run(folder: Path, extent: Extent, say: Say) -> Outcome:
     """Answer what is not answered yet, and tell what all answers say."""
-    return outcome(finished(folder, tasks(extent), say))
+    return outcome(finished(folder, tasks(extent), say), extent)
 
 
 def finished(

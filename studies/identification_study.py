@@ -134,4 +134,6 @@ STUDY = Study(
     source="paper 002 sections 4 and 5",
     run=run,
     rows=tuple(f"S002-{k}" for k in (1, 2, 3, 4, 5, 6, 7, 9, 10, 11)),
+    plants=("servo_drive", "servo_reservoir"),
+    seeds="1 to 8, one for each recording",
 )

@@ -12,7 +12,7 @@ import pickle
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import cache, cached_property, lru_cache
+from functools import cached_property, lru_cache
 from hashlib import sha256
 from math import isfinite
 from pathlib import Path
@@ -24,6 +24,7 @@ from studies.checking import Checked, Loops, drawn_plant, loops_of
 from studies.kept import Kept, Row
 from studies.specification import Asked
 from studies.verdicts import drawn_values
+from studies.versions import code_of_loops
 from studies.workers import Workers
 from workbench.errors import InputError, Message
 from workbench.law_range import beyond
@@ -62,7 +63,7 @@ class Setup:
         rig = self.rig
         origin = rig.plant.origin.rpartition(":")[0]
         decides = {
-            "code": _code(),
+            "code": code_of_loops(),
             "plant": rig.plant.name,
             "file": Path(origin).read_text(encoding="utf-8") if origin else "",
             "members": [f"{member.name}: {type(member).__name__}" for member in rig.plant.members],
@@ -100,18 +101,6 @@ def _unpacked(key: str, origin: str, rig: bytes, *content: Any) -> Setup:
     setup = Setup(pickle.loads(rig), *content)
     vars(setup)["key"] = key  # of the process that asked; it takes a moment
     return setup
-
-
-@cache
-def _code() -> str:
-    """A hash of the code that closes a loop; figures and reports are left out."""
-    root = Path(__file__).parents[1]
-    packages = ("workbench", "linearize", "controllers", "estimators")
-    files = [*root.glob("studies/*.py"), *(f for p in packages for f in root.glob(f"{p}/**/*.py"))]
-    found = sha256()
-    for file in sorted(files):
-        found.update(file.relative_to(root).as_posix().encode() + b"\0" + file.read_bytes())
-    return found.hexdigest()
 
 
 @lru_cache(maxsize=1)

@@ -20,16 +20,14 @@ from controllers import CONTROLLERS
 from controllers.spec import replaced
 from linearize.axes import drive_axis, stroke_m
 from linearize.modes import HybridModel, hybrid_modes
-from studies.closed_loop_check import run as closed
 from studies.closed_loop_check import standard_estimator
-from studies.closed_loop_metrics import measure
 from studies.controllers_study import DESIGNS
-from studies.kept import Kept, Row
+from studies.draws import kept_rows
+from studies.kept import Row
 from studies.scenarios import SAMPLE_TIME_S, Scenario
 from studies.study import Claim, Extent, Outcome, Study
 from studies.text import columns, number
-from studies.workers import Workers
-from studies.yardsticks import draw_of, medians, sine
+from studies.yardsticks import Closed, draw_of, medians, sine
 from workbench.plant import Plant
 
 DRAWS = {Extent.QUICK: 3, Extent.FULL: 20}
@@ -81,19 +79,15 @@ def worked(piece: Parted) -> Row:
     controller = found.design(parted_modes(draw.believed, piece.places), spec)
     estimator = standard_estimator("ekf", draw.believed, controller.sample_time_s)
     truth = draw.plant.lean()
-
-    def figure(scenario: Scenario, key: str) -> float:
-        record = closed(truth, controller, estimator, scenario, piece.number)
-        return 1e3 * float(getattr(measure(truth, record, scenario, "", ""), key))
-
+    loop = Closed(truth, controller, estimator, piece.number)
     far = stroke_m(truth) - NEAR_END_M
     try:
         ends = [step(NEAR_END_M, STEP_M), step(far, -STEP_M)]
         values = {
-            END: max(figure(each, "overshoot_m") for each in ends),
-            MIDDLE: figure(step(far / 2.0, STEP_M), "overshoot_m"),
-            HALF: figure(sine(truth, 0.5, WIDE_M), "rmse_m"),
-            ONE: figure(sine(truth, 1.0, WIDE_M), "rmse_m"),
+            END: 1e3 * max(loop.metrics(each).overshoot_m for each in ends),
+            MIDDLE: 1e3 * loop.metrics(step(far / 2.0, STEP_M)).overshoot_m,
+            HALF: 1e3 * loop.metrics(sine(truth, 0.5, WIDE_M)).rmse_m,
+            ONE: 1e3 * loop.metrics(sine(truth, 1.0, WIDE_M)).rmse_m,
         }
     except ArithmeticError:
         values = {}
@@ -109,9 +103,7 @@ def step(start_m: float, size_m: float) -> Scenario:
 def run(folder: Path, extent: Extent, say: Callable[[str], None]) -> Outcome:
     """Every number of parts with every draw; what is kept in the folder is not done again."""
     asked = [Parted(n, p, k) for k in range(DRAWS[extent]) for n in COMPARED for p in PLACES]
-    kept = Kept(folder / "work" / "rows.jsonl")
-    pieces = {piece.key: piece for piece in asked}
-    rows = Workers().keep(kept, worked, pieces, lambda done, of: say(f"{done} of {of} loops"))
+    rows = kept_rows(folder, worked, {piece.key: piece for piece in asked}, say)
     found: dict[tuple[str, int], list[Mapping[str, Any]]] = {}
     for piece, row in zip(asked, rows, strict=True):
         found.setdefault((piece.design, piece.places), []).append(row["found"])
@@ -157,4 +149,6 @@ STUDY = Study(
     question="how many modes along the stroke does a controller need?",
     source="physics.md 4.3 (modes of the servo drive); paper 003 has two positions",
     run=run,
+    plants=("servo_drive",),
+    seeds="draw k, from 0: 1001 + k",
 )

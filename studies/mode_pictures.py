@@ -12,8 +12,9 @@ from linearize.hybrid_simulation import HybridRun, SampledHybrid, sampled_hybrid
 from linearize.modes import HybridModel
 from linearize.visits import Visited, visited
 from studies.figures.mode_maps import mode_map_figure
+from studies.figures.modes import pole_figure
 from studies.figures.prediction import overlay_figure
-from studies.mode_views import sent_commands, view_of
+from studies.mode_views import VIEWS, sent_commands, view_of
 from workbench.recording import Recording
 from workbench.simulation import simulate
 
@@ -55,6 +56,15 @@ def step_figure(step: Step) -> Figure:
     first = next(iter(step.hybrids.values()))
     seen, shown = step.seen, view_of(first).shown
     return overlay_figure(first, seen.sample_time_s, seen.states[:shown], seen.commands, step.runs)
+
+
+def figures_of_modes(hybrid: HybridModel) -> dict[str, Figure]:
+    """The poles, and of a plant that has a view where modes are active and a step, by name."""
+    figures = {"poles": pole_figure(hybrid)}
+    if hybrid.plant.name in VIEWS:
+        modes = sampled_hybrid(hybrid, view_of(hybrid).sample_time_s)
+        figures |= {"map": map_figure(modes), "step": step_figure(step_of({"modes": hybrid}))}
+    return figures
 
 
 def map_figure(modes: SampledHybrid) -> Figure:

@@ -191,4 +191,6 @@ STUDY = Study(
     question="how few linear modes predict a drive or a gearbox over 50 ms, and where are they?",
     source="issue of the hybrid modes; paper 003 Sec. V; physics.md 4.3",
     run=run,
+    plants=("servo_drive", "gearbox"),
+    seeds="1 and 6 of the truth that hides nothing; of each manoeuvre, in its name",
 )

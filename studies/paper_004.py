@@ -237,4 +237,6 @@ STUDY = Study(
     source="paper 004, S004-3 to S004-5",
     run=run,
     rows=("S004-3", "S004-4", "S004-5"),
+    plants=("soft_joint", "soft_joint_parametric"),
+    seeds="of the records 1 and 3, of the search 4",
 )

@@ -1,4 +1,4 @@
-"""The studies, by name.  A new one is one file and one line here."""
+"""The studies, by name, the longest first.  A new one is one file and one line here."""
 
 from __future__ import annotations
 
@@ -32,18 +32,17 @@ from studies.study import Study
 STUDIES: dict[str, Study] = {
     study.name: study
     for study in (
-        control_speed_study.STUDY,
-        controllers_study.STUDY,
-        delay_study.STUDY,
-        gear_shift_study.STUDY,
-        estimators_study.STUDY,
-        fidelity_study.STUDY,
         hidden_study.STUDY,
-        identification_study.STUDY,
-        mode_count_study.STUDY,
-        mode_placement.STUDY,
+        estimators_study.STUDY,
         paper_004.STUDY,
+        controllers_study.STUDY,
+        identification_study.STUDY,
+        delay_study.STUDY,
+        mode_count_study.STUDY,
+        fidelity_study.STUDY,
         robustness_study.STUDY,
+        mode_placement.STUDY,
+        gear_shift_study.STUDY,
         shift_study.STUDY,
         rig_valve.STUDY,
         rig_open_loop.STUDY,
@@ -53,5 +52,6 @@ STUDIES: dict[str, Study] = {
         drive_details.STUDY,
         shift_timing.STUDY,
         soft_valve.STUDY,
+        control_speed_study.STUDY,
     )
 }

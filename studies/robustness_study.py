@@ -17,16 +17,14 @@ from typing import Any
 import numpy as np
 
 from studies.checking import drawn
-from studies.closed_loop_check import run as closed
 from studies.closed_loop_check import standard_estimator
-from studies.closed_loop_metrics import measure
-from studies.kept import Kept, Row
+from studies.draws import kept_rows
+from studies.kept import Row
 from studies.robustness import Line, Robustness
 from studies.scenarios import SAMPLE_TIME_S, Scenario
 from studies.study import Claim, Extent, Outcome, Study
 from studies.verdicts import drawn_values
-from studies.workers import Workers
-from studies.yardsticks import figures_of
+from studies.yardsticks import Closed, figures_of
 from workbench.rig import Rig, default_rig
 
 DRAWS = {Extent.QUICK: 60, Extent.FULL: 1000}
@@ -75,8 +73,7 @@ def measured(draw: Draw) -> Row:
     off = {name: deviations for name, (_, deviations) in drawn_values(rig, plant).items()}
     truth, scenario = plant.lean(), step_of(rig)
     try:
-        record = closed(truth, controller, estimator, scenario, draw.number)
-        row = measure(truth, record, scenario, DESIGN, "ekf")
+        row = Closed(truth, controller, estimator, draw.number).metrics(scenario)
         values = {name: getattr(row, key) * by for name, (key, by, _) in LIMITS.items()}
     except ArithmeticError:
         values = dict.fromkeys(LIMITS, np.nan)
@@ -95,21 +92,8 @@ def step_of(rig: Rig) -> Scenario:
 
 def run(folder: Path, extent: Extent, say: Callable[[str], None]) -> Outcome:
     """All draws; what is kept in the folder is not done again."""
-    return outcome(rows_of(folder, DRAWS[extent], Workers(), say))
-
-
-def rows_of(
-    folder: Path, number: int, workers: Workers, say: Callable[[str], None]
-) -> Sequence[Row]:
-    """A row for every draw, in their order."""
-    draws = {f"draw {k}": Draw(k) for k in range(number)}
-    every = max(number // 20, 1)
-
-    def tell(done: int, of: int) -> None:
-        if done % every == 0:
-            say(f"{done} of {of} draws")
-
-    return workers.keep(Kept(folder / "work" / "draws.jsonl"), measured, draws, tell)
+    draws = {f"draw {k}": Draw(k) for k in range(DRAWS[extent])}
+    return outcome(kept_rows(folder, measured, draws, say, "draws"))
 
 
 def summary(rows: Sequence[Mapping[str, Any]]) -> Robustness:
@@ -157,4 +141,6 @@ STUDY = Study(
     question="how often does one design miss its lines over drives that nobody knows exactly?",
     source="issue of the studies; Clopper and Pearson 1934",
     run=run,
+    plants=("servo_drive",),
+    seeds="draw k, from 0: 5001 + k",
 )

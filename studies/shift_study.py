@@ -214,4 +214,5 @@ STUDY = Study(
     source="paper 003 Fig. 4, S003-3",
     run=run,
     rows=("S003-3",),
+    plants=("gearbox",),
 )

@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+NUMBERS, TEXT = "study.json", "study.txt"  # in the folder of a study that has run
+
+
 class Extent(Enum):
     """How much of a study is run: a grid of minutes, or all of it, which may take hours."""
 
@@ -57,6 +60,10 @@ class Study:
         (folder for what must survive a kill, extent, progress) -> outcome.
     rows
         Experiments of the papers that it reproduces, as physics.md section 5 numbers them.
+    plants
+        Those whose parameters its report prints.
+    seeds
+        Of whatever it draws, in words.
     """
 
     name: str
@@ -64,3 +71,5 @@ class Study:
     source: str
     run: Callable[[Path, Extent, Callable[[str], None]], Outcome]
     rows: tuple[str, ...] = ()
+    plants: tuple[str, ...] = ()
+    seeds: str = ""

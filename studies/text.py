@@ -5,29 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from math import isfinite
 
+from studies.tables import Table, note
 from workbench.diagnosis.result import told
 from workbench.units import display_scale, display_unit, public_name
 
 
 def columns(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A table: numbers to the right, words to the left."""
-    rows = [list(map(str, row)) for row in rows]
-    if not rows:
-        return ""
-    widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]
-    right = [all(_numeric(row[k]) for row in rows) for k in range(len(head))]
-    lines = (
-        "  ".join(
-            word.rjust(width) if flush else word.ljust(width)
-            for word, width, flush in zip(row, widths, right, strict=True)
-        ).rstrip()
-        for row in (list(head), *rows)
-    )
-    return "\n".join(lines)
-
-
-def _numeric(word: str) -> bool:
-    return word == "-" or word.lstrip("-+").replace(" %", "").replace(".", "", 1)[:1].isdigit()
+    """A table: numbers to the right, words to the left; noted, see :mod:`studies.tables`."""
+    table = Table(tuple(map(str, head)), tuple(tuple(map(str, row)) for row in rows))
+    note(table)
+    return table.text
 
 
 def number(value: float, digits: int = 4) -> str:

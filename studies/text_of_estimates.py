@@ -40,10 +40,13 @@ def _recording_text(each: EstimatedRecording) -> str:
             _predictions(each),
             DEFINED,
             "",
-            f"on the rig's plant under the recorded inputs: RMS error by state, with "
-            f"{each.hidden} hidden, and of outputs after 50 ms without any",
+            f"on the rig's plant under the recorded inputs: RMS error by state, and with "
+            f"{each.hidden} hidden",
             _states(each),
             _seen(each),
+            "",
+            "the same with data that lack something: RMS error of outputs",
+            _disturbed(each),
             *(f"{name}: {why}" for name, why in each.lost.items()),
         )
     )
@@ -81,9 +84,16 @@ def _states(each: EstimatedRecording) -> str:
         [public_name(name), shown(known.get(name, np.nan), name, 2), *_of_state(each, name)]
         for name in names
     ]
-    for k, name in enumerate(each.outputs):
-        after = (pair for row in each.rows for pair in (shown(row.gap_rmse[k], name, 3), "-"))
-        lines.append([f"{public_name(name)} after a hole", "-", *after])
+    return columns(head, lines)
+
+
+def _disturbed(each: EstimatedRecording) -> str:
+    head = ["output", "what the data lack", *(row.name for row in each.rows)]
+    lines = [
+        [public_name(name), what, *(shown(row.disturbed[what][k], name, 3) for row in each.rows)]
+        for k, name in enumerate(each.outputs)
+        for what in each.rows[0].disturbed
+    ]
     return columns(head, lines)
 
 
@@ -139,8 +149,9 @@ def _row_document(each: EstimatedRecording, row: Estimated) -> dict[str, Any]:
         "latency_s": {"median": row.median_s, "p99": row.p99_s},
         "state_rmse": {public_name(n): _value(v, n) for n, v in row.state_rmse.items()},
         "state_rmse_hidden": {public_name(n): _value(v, n) for n, v in row.hidden_rmse.items()},
-        "after_hole_rmse": {
-            public_name(n): _value(v, n) for n, v in zip(outputs, row.gap_rmse, strict=True)
+        "disturbed_rmse": {
+            what: {public_name(n): _value(v, n) for n, v in zip(outputs, errors, strict=True)}
+            for what, errors in row.disturbed.items()
         },
     }
 

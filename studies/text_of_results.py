@@ -128,10 +128,10 @@ def where_text(found: Diagnosis) -> str:
     where = found.where
     assert where is not None
     gains = sorted(where.by_balance.items(), key=lambda item: -item[1])
-    lines = [
-        "where: " + ", ".join(f"{public_name(k)} {number(v)}" for k, v in gains)
-        + " (log-likelihood gained by an unknown input)"
-    ]  # fmt: skip
+    gaining = ", ".join(f"{public_name(k)} {number(v)}" for k, v in gains if v > 0.0)
+    lines = ["where: no balance gains likelihood by an unknown input"]
+    if gaining:
+        lines = [f"where: {gaining} (log-likelihood gained by an unknown input)"]
     follows = [f"{public_name(d.variable)} {percent(d.explains)}" for d in where.against[:3]]
     if follows:
         lines.append(f"missing term of {where.balance} follows {', '.join(follows)}")

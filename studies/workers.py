@@ -7,8 +7,9 @@ the pieces alone and not on how many workers there were or in which order they w
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import partial
 from typing import TypeVar
@@ -27,7 +28,7 @@ class Workers:
     Attributes
     ----------
     processes
-        Of this machine, all its cores by default; one works in this process.
+        Of this machine, by default all cores that it may use; one works in this process.
     scheduler
         Address of a Dask scheduler, ``tcp://host:port``: then its workers do it instead.  It and
         they need the same version of this project, and see the same files.
@@ -35,6 +36,13 @@ class Workers:
 
     processes: int = 0
     scheduler: str = ""
+
+    @property
+    def count(self) -> int:
+        """Of processes, as many as this machine lets this one use where none are named."""
+        from joblib import cpu_count
+
+        return self.processes or cpu_count()
 
     def results(
         self, work: Callable[[Piece], Row], pieces: Mapping[str, Piece]
@@ -51,10 +59,10 @@ class Workers:
             return
         from joblib import Parallel, delayed, parallel_config
 
-        count = self.processes or os.cpu_count() or 1
+        count = self.count
         here = {"backend": "loky", "n_jobs": count, "inner_max_num_threads": 1}
         with parallel_config(**here if count > 1 else {"backend": "sequential"}):
-            yield from Parallel(return_as="generator_unordered")(
+            yield from Parallel(return_as="generator_unordered", batch_size=1)(
                 delayed(_done)(work, key, piece) for key, piece in pieces.items()
             )
 
@@ -78,6 +86,24 @@ class Workers:
                 done += 1
                 say(done, len(pieces))
         return [kept.rows[key] for key in pieces]
+
+
+_CHOSEN: ContextVar[Workers] = ContextVar("workers")
+
+
+def chosen_workers() -> Workers:
+    """Those of the innermost :func:`working_with`; by default all cores."""
+    return _CHOSEN.get(Workers())
+
+
+@contextmanager
+def working_with(workers: Workers) -> Iterator[None]:
+    """What runs inside spreads its pieces over these workers."""
+    before = _CHOSEN.set(workers)
+    try:
+        yield
+    finally:
+        _CHOSEN.reset(before)
 
 
 def _done(work: Callable[[Piece], Row], key: str, piece: Piece) -> tuple[str, Row]:

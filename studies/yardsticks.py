@@ -22,8 +22,10 @@ from linearize.axes import stroke_m
 from linearize.standard import POSITION
 from studies.checking import drawn
 from studies.closed_loop_check import run, standard_estimator
-from studies.closed_loop_metrics import measure
+from studies.closed_loop_metrics import Metrics, measure
 from studies.scenarios import SAMPLE_TIME_S, Scenario
+from workbench.closed_loop import LoopRecord
+from workbench.contracts import Controller, Estimator
 from workbench.plant import Plant
 from workbench.plants.servo_drive import servo_drive
 from workbench.rig import Rig, default_rig
@@ -107,6 +109,22 @@ def sine(plant: Plant, frequency_hz: float, amplitude_m: float) -> Scenario:
     return Scenario("sine", middle_m + amplitude_m * swing, 0.0, 1.0 / frequency_hz)
 
 
+@dataclass(frozen=True)
+class Closed:
+    """One design with one estimator on the plant that moves, to be run in any scenario."""
+
+    plant: Plant
+    controller: Controller
+    estimator: Estimator
+    seed: int
+
+    def record(self, scenario: Scenario) -> LoopRecord:
+        return run(self.plant, self.controller, self.estimator, scenario, self.seed)
+
+    def metrics(self, scenario: Scenario) -> Metrics:
+        return measure(self.plant, self.record(scenario), scenario, "", "")
+
+
 def measured(draw: Draw, method: str, numbers: Mapping[str, Any]) -> dict[str, float]:
     """Every yardstick's number by its name; NaN where the loop does not stay finite.
 
@@ -115,17 +133,14 @@ def measured(draw: Draw, method: str, numbers: Mapping[str, Any]) -> dict[str, f
     controller = design(method, draw.believed, numbers).controller
     estimator = standard_estimator("ekf", draw.believed, controller.sample_time_s)
     truth, found = draw.plant.lean(), {}
-
-    def record(scenario: Scenario):
-        return run(truth, controller, estimator, scenario, draw.number)
+    loop = Closed(truth, controller, estimator, draw.number)
 
     def errors_m(scenario: Scenario) -> np.ndarray:
-        moved = record(scenario).recording[POSITION] - scenario.reference_m
+        moved = loop.record(scenario).recording[POSITION] - scenario.reference_m
         return moved[round(scenario.judged_s / SAMPLE_TIME_S) :]
 
     try:
-        stepped = step(truth)
-        one = measure(truth, record(stepped), stepped, method, "ekf")
+        one = loop.metrics(step(truth))
         found |= {FINAL: 1e3 * one.final_error_m, CYCLE: 1e3 * one.limit_cycle_m}
         found |= {RISE: 1e3 * one.rise_s}
         found[HALF] = 1e3 * float(abs(errors_m(sine(truth, 0.5, 0.06))).max())

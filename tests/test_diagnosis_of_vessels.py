@@ -216,6 +216,18 @@ def test_the_missing_flow_of_a_leaking_chamber_is_found_in_kg_s(leaking):
     assert where.term.mean() == pytest.approx(lost_kg_s, rel=0.15)
 
 
+def test_what_is_missing_is_followed_through_all_training_recordings(leaking):
+    problem = pose(chamber_decay.rig(), leaking[:2])
+    both, first = (locate(problem, leaking[:n]) for n in (2, 1))
+    in_first = both.time_s < 60.0
+
+    assert both.balance == "chamber.mass"
+    assert both.time_s[-1] == pytest.approx(100.0, rel=0.01)
+    assert both.by_balance["chamber.mass"] > first.by_balance["chamber.mass"] + 50.0
+    assert both.term[in_first].mean() == pytest.approx(first.term.mean(), rel=0.02)
+    assert both.term[~in_first].mean() < 0.5 * first.term.mean() < 0.0  # gas leaves there too
+
+
 def test_the_walls_of_a_leak_and_of_cooling_are_a_tie_in_a_minute(leaking):
     found = diagnose(chamber_decay.rig(), leaking[:2], leaking[2:])
     leader = found.ranking[0]

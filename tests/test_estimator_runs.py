@@ -7,7 +7,7 @@ import pytest
 from linear_plant import cart
 from test_estimators import DT_S, FORCE_NOISE, NOISE_M, cart_data, on_cart
 
-from estimators.tuning import tuned_noise
+from estimators.tuning import own_noise, suited, tuned_noise
 from studies.estimator_runs import band, fed, follow, foretold, nees, whiteness
 from studies.estimator_truths import counted
 from workbench.plants.vertical_cylinder import vertical_cylinder
@@ -167,3 +167,18 @@ class Failing:
 def test_an_estimator_that_is_lost_says_where(error):
     with pytest.raises(ArithmeticError, match="lost at sample 0"):
         follow(Failing(on_its_start(), error), np.zeros((1, 5)), np.zeros((1, 5)), 0)
+
+
+@pytest.mark.parametrize("name", ["kalman", "imm"])
+def test_the_noise_of_ones_own_innovations_is_that_which_drove_the_plant(name):
+    """From a thirtieth of it on; on a linear plant both are the Kalman filter."""
+    u, y = cart_data(300)
+    begun = replace(on_cart(name), process_noise={VELOCITY: FORCE_NOISE / 30.0})
+
+    found = own_noise(begun, u.T, y.T)
+    fitted = suited(begun, u.T, y.T)
+
+    assert found.process_noise[VELOCITY] == pytest.approx(FORCE_NOISE, rel=0.4)
+    assert found.log_likelihood > found.before + 100.0
+    assert fitted.process_noise == found.process_noise
+    assert suited(on_cart("ekf"), u.T, y.T).process_noise == {VELOCITY: FORCE_NOISE}

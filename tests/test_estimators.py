@@ -158,14 +158,16 @@ def test_an_estimator_predicts_when_nothing_is_received(name):
 
 @everyone
 def test_a_measurement_never_makes_a_state_less_certain(name):
+    """But for a bristle in a mixture: which way it is bent follows from the odds of the regimes."""
     plant = servo_drive().lean()
     estimator, at = standard_estimator(name, plant, 2e-3), np.array([0.145, 5.65e5, 5.65e5])
     begun = estimator.start(at)
     blind = estimator.update(begun, plant.nominal[0], np.full(3, np.nan))
     seeing = estimator.update(begun, plant.nominal[0], at)
 
-    gained = in_scales(blind, plant) - in_scales(seeing, plant)
-    assert gained.diagonal().min() > -1e-9
+    gained = (in_scales(blind, plant) - in_scales(seeing, plant)).diagonal()
+    mixed = [name == "imm" and state.endswith(".deflection_m") for state in seeing.names]
+    assert gained[np.logical_not(mixed)].min() > -1e-9
 
 
 @everyone

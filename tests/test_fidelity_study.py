@@ -15,7 +15,7 @@ def rows(**factors):
     return {n: [dict.fromkeys(JUDGED, named.get(n, 1.0))] * 3 for n in LACKING}
 
 
-WORTH = {"dead zone of the valve": 3.0, "dry friction": 4.0}
+WORTH = {"dead zone of the valve": 3.0, "dry friction": 4.0, "dead volumes": 2.1}
 
 
 def test_every_lack_changes_the_plant_and_the_whole_one_nothing():
@@ -44,7 +44,8 @@ def test_claims_hold_where_the_numbers_say_so():
 @pytest.mark.parametrize(
     ("factors", "fails"),
     [
-        ({"dry friction": 1.5}, "dry friction is worth"),
+        ({"dry friction": 1.5}, "without dry friction"),
+        ({"dead volumes": 1.9}, "without dead volumes"),
         ({"heat of the walls": 1.3}, "heat of the walls is not"),
         ({"stiction": 0.8}, "no model that lacks something"),
     ],

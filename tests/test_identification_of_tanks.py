@@ -176,6 +176,16 @@ def test_what_a_rig_fixes_stays(limits):
     assert better.plant.values[ZONE[1]] == limits[ZONE[1]].value
 
 
+def test_a_value_beyond_its_range_is_taken_at_its_end_and_the_rig_says_so(limits):
+    first, *others = limits.parameters
+    end = TANK.plant.parameters[first.name].upper
+    better = replace(limits, parameters=(replace(first, value=end + 1.0), *others)).improved()
+
+    assert better.plant.values[first.name] == end
+    assert any("at the end of its range" in note for note in better.notes)
+    assert not any("at the end of its range" in note for note in limits.improved().notes)
+
+
 def test_the_rig_file_says_where_a_value_comes_from_once(limits, sweep):
     note = PROCEDURES["dead-zone"].note(limits, [sweep])
     twice = replace(limits, rig=limits.improved(note=note)).improved(note=note)

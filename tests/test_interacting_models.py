@@ -113,6 +113,30 @@ def test_a_slide_that_starts_and_stops_is_told_from_one_that_sticks():
     assert slides[speed > 0.02].mean() > 0.95
 
 
+def test_a_slide_that_has_stopped_swings_on_its_bristle():
+    """20 ms of swinging at 20 mm/s, which a regime that only holds the slide would miss."""
+    plant = servo_drive().lean()
+    step, (_, d, p) = plant.model.compiled_step(1e-3), plant.nominal
+    estimator, rng, x, sent = on_drive(), np.random.default_rng(4), plant.initial, np.array([4.95])
+    estimate, speed, error, sticks = None, [], [], []
+    for k in range(700):
+        y = x[[0, 2, 4]] + rng.standard_normal(3) * [5e-6, 500.0, 500.0]
+        estimate = estimate or estimator.start(y)
+        estimate = estimator.update(estimate, sent, y)
+        speed.append(x[1])
+        error.append(estimate.pick(["slide.velocity_m_s"])[0] - x[1])
+        sticks.append(estimate.notes[PROBABILITY + "stick"])
+        sent = np.array([5.6 if 100 <= k < 300 else 4.95])
+        x = step(x, sent, d, p).full().ravel()
+    moving = np.flatnonzero(np.abs(speed) > 0.05)
+    after = slice(moving[-1] + 8, moving[-1] + 28)
+    speed, error, sticks = map(np.array, (speed, error, sticks))
+
+    assert np.std(speed[after]) > 5e-3
+    assert np.std(error[after]) < 0.5 * np.std(speed[after])
+    assert np.median(sticks[after]) > 0.9
+
+
 def test_all_regimes_have_the_same_states_and_other_rates():
     for plant, n in ((servo_drive(), 3), (gearbox(), 4), (soft_joint(), 2)):
         found = regimes(plant)

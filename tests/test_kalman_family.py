@@ -87,6 +87,49 @@ def test_a_mode_that_lasts_comes_to_the_gain_of_its_riccati_equation():
     assert estimate.memory == pytest.approx(ahead - K @ C @ ahead, rel=1e-6, abs=1e-14)
 
 
+@pytest.mark.parametrize("name", ["ekf", "kalman", "imm"])
+def test_an_estimator_with_other_noise_is_the_one_that_is_made_with_it(name, uncompiled):
+    more = {VELOCITY: 0.5, **dict.fromkeys(OUTPUTS[1:], 2e4)}
+    fresh, retuned = on_drive(name, process_noise=more), on_drive(name).retuned(more)
+    y, u, off = np.array([0.145, 5.65e5, 5.65e5]), np.array([5.4]), np.array([1e-5, 1e3, 1e3])
+
+    one, other = (each.update(each.start(y), u, y + off) for each in (fresh, retuned))
+
+    assert retuned.process_noise == more
+    assert other.state == pytest.approx(one.state, rel=1e-12)
+    assert other.covariance == pytest.approx(one.covariance, rel=1e-9, abs=1e-30)
+    assert other.notes["log-likelihood"] == pytest.approx(one.notes["log-likelihood"])
+
+
+def test_the_likelihood_of_the_linear_filter_is_that_of_the_extended_one_on_a_linear_plant():
+    u, y = cart_data(30)
+    last = [run(on_cart(name), u, y)[-1].notes for name in ("kalman", "ekf")]
+
+    assert last[0]["log-likelihood"] == pytest.approx(last[1]["log-likelihood"], rel=1e-6)
+    assert last[0]["nis"] == pytest.approx(last[1]["nis"], rel=1e-5)
+
+
+@pytest.mark.parametrize(("place_m", "on"), [(12.05e-3, (1.0, 0.0)), (-12.05e-3, (0.0, 1.0)),
+                                             (0.0, (1.0, 1.0))])  # fmt: skip
+def test_a_piston_that_contacts_hold_is_not_taken_to_move(place_m, on):
+    """Pressed against an end by 5 bar, or held at Neutral from both sides."""
+    plant = PLANTS["gearbox"]().lean()
+    noise = {"main_piston.velocity_m_s": 5.0, "main_piston.position_m": 0.0}
+    noise |= dict.fromkeys(plant.measured[:2], 3e5)
+    sizes = [5e-5 if name.endswith("_m") else 1e3 for name in plant.measured]
+    kalman = on_drive("kalman", plant, process_noise=noise,
+                      measurement_noise=dict(zip(plant.measured, sizes, strict=True)))  # fmt: skip
+    known = {"main_piston.position_m": place_m}
+    known |= {n: 1e5 + 4e5 * v for n, v in zip(plant.measured[:2], on, strict=True)}
+    y, rng = np.array([known[n] for n in plant.measured]), np.random.default_rng(1)
+    estimate, speeds = kalman.start(y), []
+    for _ in range(60):
+        estimate = kalman.update(estimate, np.array(on), y + sizes * rng.standard_normal(3))
+        speeds.append(abs(estimate.pick(["main_piston.velocity_m_s"])[0]))
+
+    assert max(speeds) < 0.05
+
+
 def test_the_scheduled_filter_follows_the_drive_through_its_modes():
     plant = servo_drive().lean()
     step, (_, d, p) = plant.model.compiled_step(1e-3), plant.nominal

@@ -3,85 +3,25 @@
 WORKBENCH_SCREENSHOTS names a folder that keeps the screenshots.
 """
 
-import os
 import shutil
-import signal
-import subprocess
-import sys
-from pathlib import Path
 
 import pytest
+from page_browser import NEEDED, Served, chromium, click, drag, no_wider_than_the_window
 from page_files import drive_files
 
 from studies.demo import DATA
 from workbench.rig import load_rig
 
-CHROMIUM = "/usr/bin/chromium"
-FLAGS = [
-    "--headless",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
 LONG_MS = 900_000  # of a diagnosis on a busy machine
-ROOT = Path(__file__).parent.parent
 
 pytest.importorskip("bokeh", reason="the page needs bokeh (extra `page`)")
-playwright = pytest.importorskip("playwright.sync_api", reason="playwright drives the browser")
-pytestmark = pytest.mark.skipif(
-    not Path(CHROMIUM).exists(), reason=f"no {CHROMIUM}: `apt-get install chromium`"
-)
+pytestmark = NEEDED
 
 
 @pytest.fixture(scope="module")
 def browser():
-    with playwright.sync_playwright() as started:
-        found = started.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+    with chromium() as found:
         yield found
-        found.close()
-
-
-class Served:
-    """A running page, and browser tabs on it."""
-
-    def __init__(self, browser, folder, *files):
-        self.browser, self.folder = browser, folder
-        self.asked = []
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", "studies.command_line", "app", *files],
-            cwd=folder, stdout=subprocess.PIPE, text=True,
-            env={**os.environ, "PYTHONPATH": str(ROOT)},
-        )  # fmt: skip
-        self.address = self.process.stdout.readline().split()[-1]
-
-    def tab(self, width=1280, height=800, scale=1.0):
-        size = {"width": round(width / scale), "height": round(height / scale)}
-        found = self.browser.new_page(viewport=size, device_scale_factor=scale)
-        found.set_default_timeout(120_000)
-        found.on("request", lambda request: self.asked.append(request.url))
-        found.goto(self.address)
-        return found
-
-    def shot(self, page, name):
-        folder = Path(os.environ.get("WORKBENCH_SCREENSHOTS", self.folder))
-        page.wait_for_timeout(700)
-        page.screenshot(path=folder / f"{name}.png", full_page=True)
-        assert (folder / f"{name}.png").stat().st_size > 20_000
-
-    def children(self):
-        """Processes that the server started, by command."""
-        listed = subprocess.run(
-            ["ps", "-eo", "pid,ppid,args"], capture_output=True, text=True, check=True
-        ).stdout.splitlines()
-        return [line for line in listed if "forkserver" in line]
-
-    def close(self):
-        self.process.send_signal(signal.SIGINT)
-        assert self.process.wait(30) == 0
 
 
 @pytest.fixture
@@ -97,23 +37,14 @@ def served(browser, tmp_path):
         each.close()
 
 
-def click(page, label):
-    page.get_by_role("button", name=label, exact=True).last.click()
-
-
-def drag(page, x, y, far):
-    """Draw a box to the right as slowly as a hand does."""
-    page.mouse.move(x, y)
-    page.wait_for_timeout(200)
-    page.mouse.down()
-    for k in range(1, 9):
-        page.mouse.move(x + far * k / 8, y + 3 * k)
-        page.wait_for_timeout(50)
-    page.mouse.up()
-
-
-def no_wider_than_the_window(page):
-    return page.evaluate("document.documentElement.scrollWidth <= window.innerWidth + 1")
+def seen(page_of, page, name):
+    """A screenshot at 1280 x 800 and at 200 %, with nothing that sticks out of the window."""
+    for scale, width, height in ((1, 1280, 800), (2, 640, 400)):
+        page.set_viewport_size({"width": width, "height": height})
+        page.wait_for_timeout(500)
+        assert no_wider_than_the_window(page), (name, scale)
+        page_of.shot(page, name if scale == 1 else f"{name}_zoomed")
+    page.set_viewport_size({"width": 1280, "height": 800})
 
 
 def test_a_wrong_file_is_told_on_the_page_and_two_tabs_do_not_mix(served, tmp_path):
@@ -152,6 +83,36 @@ def test_a_box_drawn_with_the_mouse_lights_samples_up(served, tmp_path):
     page_of.shot(page, "brushed")
 
 
+def modes_design_report(page_of, page):
+    """Tabs 5 to 7: a boundary is moved, a method chosen for a mode, and all of it reported."""
+    click(page, "5 Modes")
+    click(page, "Linearise")
+    page.wait_for_selector("text=prediction error over 50 ms")
+    click(page, "Cut by hand")
+    handle = page.locator(".noUi-handle:visible").nth(4)
+    handle.focus()
+    for _ in range(5):
+        page.keyboard.press("ArrowRight")
+    page.wait_for_selector("text=(before")
+    seen(page_of, page, "5_modes")
+
+    click(page, "6 Design and check")
+    page.get_by_label("Controller", exact=True).select_option("per-mode")
+    page.wait_for_selector("text=stable: gain up to")
+    page.get_by_label("charge a slide + middle", exact=True).select_option("cascade")
+    click(page, "Design and check")
+    page.wait_for_selector("text=certified across")
+    page.get_by_label("Specification").fill('rise_time = "1 ms"')
+    page.wait_for_selector("text=specification missed: rise_time")
+    seen(page_of, page, "6_design_and_check")
+
+    click(page, "7 Report")
+    click(page, "Write report")
+    page.wait_for_selector("iframe")
+    seen(page_of, page, "7_report")
+    assert "The plant as modes" in (page_of.folder / "report" / "report.html").read_text()
+
+
 @pytest.mark.slow
 def test_the_loop_on_the_demo_recording_from_files_to_a_saved_rig(served, tmp_path):
     for name in ("rig.toml", "train.csv", "validation.csv"):
@@ -162,23 +123,23 @@ def test_the_loop_on_the_demo_recording_from_files_to_a_saved_rig(served, tmp_pa
     page.wait_for_selector("text=Plausible?")
     click(page, "Check before a fit")
     page.wait_for_selector("text=uncertain parameters")
-    page_of.shot(page, "1_recording")
+    seen(page_of, page, "1_recording")
 
     click(page, "2 Compare")
     click(page, "Compare")
     page.wait_for_selector("text=Errors of train")
-    page_of.shot(page, "2_compare")
+    seen(page_of, page, "2_compare")
 
     click(page, "3 Missing effect")
     click(page, "Diagnose")
     page.wait_for_selector("text=is missing: it removes")
     named = page.get_by_text("is missing: it removes").inner_text().split()[0]
-    page_of.shot(page, "3_missing_effect")
+    seen(page_of, page, "3_missing_effect")
 
     click(page, "4 Add and fit")
     page.get_by_label(named, exact=True).check()
     page.wait_for_selector("text=What moved")
-    page_of.shot(page, "4_add_and_fit")
+    seen(page_of, page, "4_add_and_fit")
     rows = page.locator("table").filter(has_text="RMSE before").locator("tr").all_inner_texts()
     fits = [row.split("\t") for row in rows if row.startswith("validation")]
     assert len(fits) == 3
@@ -188,6 +149,10 @@ def test_the_loop_on_the_demo_recording_from_files_to_a_saved_rig(served, tmp_pa
     click(page, "Save rig")
     page.wait_for_selector("text=workbench.write_rig(rig, 'better.toml')")
     assert named in load_rig(tmp_path / "better.toml").added
+
+    modes_design_report(page_of, page)
+
+    click(page, "4 Add and fit")
     page.get_by_label(f"1. {named}", exact=True).uncheck()
     page.get_by_text("What moved").wait_for(state="hidden")
 

@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,8 +13,10 @@ from hypothesis import strategies as st
 from page_files import drive_files
 
 from studies.page import tasks
+from studies.page.balance_terms import terms_of
 from studies.page.decimation import peaks
 from studies.page.jobs import STOPPED, Job
+from studies.page.missing_term import in_people
 from studies.page.replay import script
 from studies.page.session import (
     Role,
@@ -36,7 +39,9 @@ from studies.page.verbs import (
     with_accepted,
     with_compared,
 )
+from workbench.diagnosis.where import locate
 from workbench.errors import InputError
+from workbench.fitting.problem import pose
 from workbench.rig import load_rig
 from workbench.rig_writing import rig_text
 
@@ -207,6 +212,27 @@ def test_a_box_chooses_the_samples_inside_of_it():
 
     assert np.flatnonzero(time).tolist() == [1, 2, 3]
     assert np.flatnonzero(cloud).tolist() == [2, 4]
+
+
+def test_the_term_of_every_balance_is_found_as_the_diagnosis_finds_the_worst(session):
+    """Asked for anew, the worst one comes out as :func:`locate` has it."""
+    rig, train = session.now.rig, recordings(session.of(Role.TRAINING))
+    problem = pose(rig, train)
+    worst = locate(problem, train)
+
+    found = terms_of(rig, problem.base, replace(worst, balance="another"))
+
+    again = found[worst.balance]
+    assert again.term == pytest.approx(worst.term, rel=1e-6)
+    assert again.term_deviation == pytest.approx(worst.term_deviation, rel=1e-6)
+    follows = {each.variable: each.explains for each in worst.against}
+    found_too = {each.variable: each.explains for each in again.against}
+    assert found_too == pytest.approx(
+        follows, abs=0.01
+    )  # a sample on the edge of a bin is in either
+    assert {*found} == {"another", *worst.by_balance}
+    units = {name: in_people(each.term_name)[1] for name, each in found.items()}
+    assert units["slide.momentum"] == "N" and units["chamber_a.mass"] == "l/min ANR"
 
 
 def answered(job, limit_s=60.0):

@@ -11,11 +11,14 @@ from bokeh.document import Document
 from linearize.standard import standard_modes
 from studies.cuts_file import modes_by_cuts
 from studies.page import tasks
+from studies.page.control_verbs import with_offers
 from studies.page.mode_cuts import boundaries, cuts_of, cuts_text, moved
+from studies.page.offers import mode_offers
 from studies.page.pages import TABS, all_tabs
 from studies.page.session import Role, Session, recordings, with_opened, with_rig, with_role
 from studies.page.verbs import with_compared
 from studies.page.view import Page
+from studies.specification import design_numbers, read_specification
 from workbench.rig import default_rig
 
 
@@ -78,6 +81,18 @@ def test_a_box_in_one_picture_lights_the_same_samples_in_all(page):
     assert not tab._traces.source.selected.indices
 
 
+def test_the_worst_residuals_are_selected_without_a_mouse(page):
+    tab = look_at(page, "Compare")
+
+    tab._worst()
+
+    error = np.abs(tab._traces.rows["e:slide.position_m"])
+    lit = tab._traces.selected
+    assert lit.mean() == pytest.approx(0.05, abs=0.005)
+    assert error[lit].min() >= error[~lit].max()
+    assert "samples lit" in tab._lit.text
+
+
 def test_a_zoom_sends_the_samples_of_the_window_and_keeps_what_is_lit(page):
     traces = look_at(page, "Compare")._traces
     traces.select(traces.rows["time"] > 0.5)
@@ -135,3 +150,74 @@ def test_cuts_of_standard_modes_are_a_file_that_gives_them_again_and_move(tmp_pa
 
 def test_modes_that_are_no_product_of_intervals_have_no_cuts_to_move():
     assert cuts_of(standard_modes(default_rig("crr_rig").plant)) == {}
+
+
+def test_methods_and_estimators_are_chosen_by_mode_and_stand_in_what_is_designed(page, compared):
+    rig = compared.now.rig
+    page.become(with_offers(compared, mode_offers(rig, quiet)))
+    tab = look_at(page, "Design and check")
+    assert not tab._by_mode._whole.visible
+
+    tab._method.value = "per-mode"
+    lines = tab._by_mode
+    lines._methods["charge a slide + middle"].value = "cascade"
+    lines._estimators["stick"].value = "kalman"
+    spec, observers = lines.with_choices(tab._spec.value, ["ekf"])
+
+    assert lines._whole.visible and len(lines._methods) == 6
+    numbers = design_numbers(read_specification(spec, rig, ["step"]), "per-mode", rig.plant)
+    assert numbers["modes"]["charge a slide + middle"] == "cascade"
+    assert observers == ["ekf,kalman@stick"]
+    told = [each.text for each in lines._lines.children[1].children if hasattr(each, "text")]
+    assert len(told) == 1 and "stable: gain up to" in told[0]
+    tab._method.value = "lq"
+    assert tab._by_mode.with_choices("x", ["ekf"]) == ("x", ["ekf"])
+
+
+def test_what_is_offered_is_for_the_plant(tmp_path, page):
+    for plant, method, observers in (
+        ("gearbox", "hybrid-mpc", []),
+        ("crr_arm", "axis-lq", ["kalman", "ekf", "ukf", "imm", "mhe", "raw"]),
+        ("closed_chamber", "", []),
+    ):
+        path = tmp_path / f"{plant}.toml"
+        path.write_text(f'plant = "{plant}"\n')
+        page.attempt(lambda session, path=path: with_rig(session, str(path)))
+        tab = look_at(page, "Design and check")
+
+        assert tab._method.value == method
+        assert tab._observers.labels == observers
+        look_at(page, "Report")
+    look_at(page, "Design and check")._check()
+    assert "no standard modes to control" in page._status.text
+
+
+def test_a_second_comparison_takes_the_place_of_the_first(page, compared):
+    tab = look_at(page, "Compare")
+    before = tab._traces.source.data
+    again = tasks.compare(compared.now.rig, recordings(compared.used), quiet)
+
+    page.become(with_compared(compared, again))
+
+    assert tab._of[0] is again
+    assert tab._traces.source.data is not before
+
+
+def test_a_tab_is_drawn_again_only_when_what_it_shows_is_another(page, compared):
+    tab, drawn = look_at(page, "Compare"), []
+    tab.show = drawn.append
+
+    page.become(with_offers(compared, None))
+    assert not drawn
+    page.become(with_compared(compared, None))
+    assert len(drawn) == 1
+
+
+def test_an_effect_that_is_refused_or_cancelled_is_not_ticked(page, compared):
+    tab = look_at(page, "Add and fit")
+    page.become(with_role(compared, compared.files[0].opened.path, Role.ASIDE))
+    tab._names, tab._ticks.labels = ["piston_leak"], ["piston_leak"]
+
+    tab._ticks.active = [0]
+
+    assert tab._ticks.active == [] and "no recording is for training" in page._status.text

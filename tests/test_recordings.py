@@ -12,7 +12,7 @@ from recording_files import FACTORS, FULL, NAMES, RIG, N, read, refused, table, 
 from workbench.differentiator import derivative
 from workbench.errors import InputError
 from workbench.reading import RecordingWarning, read_recording, write_recording
-from workbench.recording import Recording
+from workbench.recording import Recording, joined
 from workbench.rig import default_rig, load_rig
 
 
@@ -190,3 +190,14 @@ def test_the_differentiator_is_exact_on_a_parabola_and_stays_inside_pieces():
     speed = derivative(position, 0.01, starts=(0, 40))
 
     assert speed == pytest.approx(np.concatenate([6 * t, 0 * t]), abs=1e-10)
+
+
+def test_recordings_are_joined_as_pieces_of_the_channels_that_all_have():
+    gap = Recording("gap", 0.1, {"a": np.arange(5.0), "b": np.zeros(5)}, starts=(0, 2))
+    plain = Recording("plain", 0.1, {"a": np.arange(3.0)})
+    both = joined([gap, plain])
+
+    assert both.starts == (0, 2, 5)
+    assert list(both.channels) == ["a"]
+    assert [piece["a"].tolist() for piece in both.pieces] == [[0, 1], [2, 3, 4], [0, 1, 2]]
+    assert joined([gap]) is gap

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
+from studies.draws import kept_rows
 from studies.kept import Kept
 from studies.robustness import Line, Robustness
-from studies.robustness_study import Draw, measured, outcome, rows_of, summary
-from studies.workers import Workers
+from studies.robustness_study import Draw, measured, outcome, summary
+from studies.workers import Workers, working_with
 
 N = 200
 MASS, AREA = "slide.mass_kg", "valve.flow_area_m2"
@@ -73,11 +74,12 @@ def test_too_few_draws_say_nothing_of_influences(found):
 
 def test_two_drives_of_the_study_differ_and_are_the_same_again(tmp_path):
     first = measured(Draw(0))
-    rows = rows_of(tmp_path, 2, Workers(1), lambda message: None)
+    with working_with(Workers(1)):
+        rows = kept_rows(tmp_path, measured, {str(k): Draw(k) for k in range(2)}, print)
 
     assert rows[0]["found"] == first["found"]
     assert rows[1]["found"] != first["found"]
-    assert len(Kept(tmp_path / "work" / "draws.jsonl").rows) == 2
+    assert len(Kept(tmp_path / "work" / "rows.jsonl").rows) == 2
     said = outcome(rows)
     assert all(claim.holds for claim in said.claims if "no draw is lost" in claim.claim)
     assert set(said.figures) == {"spread", "influences"}

@@ -1,7 +1,9 @@
 """Studies: what is kept of long work, what the rows of the hidden-effect study say, the command."""
 
 import json
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
@@ -14,9 +16,12 @@ from studies.hidden_rows import Kind, Row, plain, row_again
 from studies.hidden_tasks import tasks
 from studies.kept import Kept
 from studies.registry import STUDIES
-from studies.running import run_study
+from studies.running import ALL, run_study
 from studies.study import Claim, Extent, Outcome, Study
 from workbench.rig import default_rig
+
+ROOT = Path(__file__).parent.parent
+MOST_BYTES = 120_000
 
 
 def row(hidden="coulomb_friction", first=None, place=1, own_drop=0.9, kind=Kind.EFFECT, **other):
@@ -30,7 +35,7 @@ def row(hidden="coulomb_friction", first=None, place=1, own_drop=0.9, kind=Kind.
 
 
 def held(found):
-    return {claim.claim.partition(", at")[0]: claim.holds for claim in found.claims}
+    return {claim.claim.partition(",")[0]: claim.holds for claim in found.claims}
 
 
 def test_rows_survive_and_a_line_cut_short_is_left_out(tmp_path):
@@ -62,6 +67,33 @@ def test_a_visible_effect_on_rank_four_fails_three_claims():
     assert said["visible effects first"]
     assert not said["visible effects first or tied"]
     assert not said["visible effects in the top three"]
+
+
+def test_where_more_than_three_are_said_to_do_the_same_the_top_three_claim_nothing():
+    crowd = row("sensor_offset", "constant_force", 4, tied=True, verdict="recording_too_weak")
+    said = held(outcome([row(seed=k) for k in range(9)] + [crowd]))
+
+    assert said["visible effects in the top three"]
+    assert said["visible effects first or tied"]
+
+
+def test_a_sample_refutes_a_bar_only_where_chance_does_not_explain_it():
+    rows = [row(seed=k) for k in range(7)] + [row("stiction", "valve_lag", 2, tied=True)]
+    wrong = [row("stiction", "valve_lag", 2, tied=True, seed=k) for k in range(3)]
+
+    assert not held(outcome(rows))["visible effects first"]  # 7 of 8, asked 90 %
+    assert held(outcome(rows, Extent.QUICK))["visible effects first"]
+    assert not held(outcome(rows + wrong, Extent.QUICK))["visible effects first"]
+    false_name = row("nothing", "stiction", 0, kind=Kind.NOTHING, right=False)
+    assert not held(outcome([false_name], Extent.QUICK))["no false name where nothing is hidden"]
+
+
+def test_sizes_of_strong_effects_are_claimed_by_their_median():
+    close, off = row(found=10.4), row(found=6.0)
+    key = "median error of the size of strong effects"
+
+    assert held(outcome([close, close, off]))[key]
+    assert not held(outcome([close, off, off]))[key]
 
 
 def test_an_effect_that_hardly_shows_counts_among_all_only():
@@ -185,10 +217,10 @@ def small():
 
 def test_a_study_writes_its_text_and_numbers_and_says_whether_claims_hold(small, tmp_path):
     said = []
-    holds = run_study(small, tmp_path, Extent.QUICK, "workbench study sum", print, said.append)
+    failed = run_study(small, tmp_path, Extent.QUICK, "workbench study sum", print, said.append)
 
     document = json.loads((tmp_path / "study.json").read_text())
-    assert not holds
+    assert failed == ["sum: two and two make five (4)"]
     assert document["claims"] == [{"claim": "two and two make five", "found": "4", "holds": False}]
     assert document["numbers"] == {"sum": 4}
     assert "NO" in said[0]
@@ -208,3 +240,16 @@ def test_every_study_is_listed_with_its_question():
     for study in STUDIES.values():
         assert study.name in said
         assert study.question in said
+
+
+def test_the_gallery_shows_eight_small_figures_of_studies_that_there_are():
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    shown = re.findall(r"!\[[^]]+\]\((studies/gallery/[^)]+)\)", text)
+    named = set(re.findall(r"workbench study ([a-z0-9-]+)", text))
+
+    assert len(shown) == 8
+    assert {path.name for path in (ROOT / "studies" / "gallery").iterdir()} == {
+        Path(path).name for path in shown
+    }
+    assert all((ROOT / path).stat().st_size < MOST_BYTES for path in shown)
+    assert named <= {*STUDIES, ALL}

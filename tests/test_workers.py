@@ -11,6 +11,7 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
+from commands import call
 
 from studies.kept import Kept
 from studies.workers import Workers
@@ -149,3 +150,27 @@ def test_a_cluster_gives_the_same_rows_and_keeps_them(tmp_path):
 
     assert [row["value"] for row in rows] == [drawn(k)["value"] for k in PIECES.values()]
     assert set(Kept(tmp_path / "rows").rows) == set(PIECES)
+
+
+@pytest.mark.slow
+def test_a_check_on_a_cluster_answers_as_here(lq, tmp_path):
+    pytest.importorskip("distributed", reason="the extra `cluster` is not installed")
+    rig = tmp_path / "rig.toml"
+    rig.write_text('plant = "servo_drive"\n')
+    check = ("check", rig, lq, "--scenario", "step", "--runs", 4, "-q", "--json")
+    with cluster(tmp_path) as address:
+        there = call(*check, tmp_path / "there.json", "--scheduler", address)
+    here = call(*check, tmp_path / "here.json", "--workers", 1)
+
+    assert there.exit_code == here.exit_code
+    found, again = (timeless(tmp_path / f"{name}.json") for name in ("there", "here"))
+    assert len(found["runs"]) == 4
+    assert found == again
+
+
+def timeless(path):
+    """The document of a check without what a clock measured."""
+    document = json.loads(path.read_text())
+    clock = ("solve_median_s", "solve_p99_s", "estimate_median_s")
+    runs = [{k: v for k, v in run.items() if k not in clock} for run in document["runs"]]
+    return {**document, "runs": runs}

@@ -1,8 +1,8 @@
 """What a physical effect is: named parameters, and the flows it puts into the balances.
 
 A pneumatic actuator is a set of balances: the gas in each chamber, the momentum of each body.
-An effect is anything that puts a flow into one of them, or that alters a named signal.  No effect
-knows which others are present; flows simply add.  That is what makes them composable.
+An effect puts a flow into one of them, or alters a named signal.  No effect knows which others are
+present; flows simply add.  That is what makes them composable.
 
 Parameters come in two kinds.
 
@@ -10,11 +10,11 @@ strength    Has a null value, which is also its default: every effect is born ab
             strengths at null the effect contributes exactly nothing.
 form        Has a typical value.  It says what the effect looks like once it is present.
 
-A parameter holds a float or a CasADi symbol, and the physics cannot tell which.  So each equation
-is written once, and simulation, linearisation, MPC, MHE and fitting all read it.
+A parameter holds a float or a CasADi symbol: each equation is written once, and simulation,
+linearisation, MPC, MHE and fitting all read it.
 
-What a strength *means* to a person looking for what a model lacks is a :class:`Cause`: its public
-name, the balance it enters, the variables that reveal it and the sizes worth trying.
+What a strength *means* to a person who looks for what a model lacks is a :class:`Cause`: its name,
+the balance it enters, the variables that reveal it and the sizes worth trying.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from enum import Enum
+from functools import cache
 from math import inf, isfinite
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -235,6 +236,7 @@ class Effect:
                 )
 
     @classmethod
+    @cache  # asked for some hundred thousand times in a diagnosis
     def parameters(cls) -> dict[str, Parameter]:
         """All parameters by field name, strengths and forms."""
         return {f.name: f.metadata["parameter"] for f in fields(cls) if "parameter" in f.metadata}
@@ -248,10 +250,8 @@ class Effect:
     def absent(self) -> bool:
         """True when the effect has strengths and every one is at its null value."""
         nulls = {k: v.null for k, v in self.parameters().items() if v.null is not None}
-        return bool(nulls) and all(
-            isinstance(getattr(self, k), int | float) and getattr(self, k) == null
-            for k, null in nulls.items()
-        )
+        held = ((getattr(self, k), null) for k, null in nulls.items())
+        return bool(nulls) and all(isinstance(v, int | float) and v == null for v, null in held)
 
     def reduced(self) -> Effect:
         """The same effect without what is absent in it, where that spares it a state."""

@@ -6,8 +6,8 @@ old estimate to the new one is one CasADi function, compiled as a whole and call
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -51,10 +51,12 @@ class _WholeFilter(PlantFilter):
 class FilterUpdate:
     """Predict, then correct, in one call; ``filter`` must use every sample.
 
-    The buffers are its own, so that two threads need one each.
+    The buffers are its own, so that two threads need one each.  What states gain in a sample is an
+    argument, so that filters which differ in that alone share one function: that of ``like``.
     """
 
     filter: PlantFilter
+    like: FilterUpdate | None = None
 
     def __call__(
         self, X: np.ndarray, P: np.ndarray, u: np.ndarray, y: np.ndarray, received: np.ndarray
@@ -72,10 +74,14 @@ class FilterUpdate:
         """The call alone, on what the buffers hold."""
         return self._buffers[2]
 
+    def retuned(self, process_noise: Mapping[str, float]) -> FilterUpdate:
+        """The same with other process noise; the function is there already."""
+        return FilterUpdate(replace(self.filter, process_noise=process_noise), self)
+
     @cached_property
     def function(self) -> ca.Function:
-        """(X, P, u, y, received, d, p) -> :class:`Updated`, compiled where that can be done."""
-        return compiled(self.built)
+        """(X, P, u, y, received, d, p, Q) -> :class:`Updated`, compiled where that can be done."""
+        return self.like.function if self.like else compiled(self.built)
 
     @cached_property
     def built(self) -> ca.Function:
@@ -86,23 +92,26 @@ class FilterUpdate:
         X, P, u, d, p, y, received = (
             ca.MX.sym(f"i{i}", *whole.correct.size_in(i)) for i in range(7)
         )
-        ahead, spread, _ = whole.predict(X, P, u, d, p)
+        Q = ca.MX.sym("Q", *whole.step_covariance.shape)
+        ahead, spread, _ = whole.predict_gaining(X, P, u, d, p, Q)
         told = whole.correct_with_nis(ahead, spread, u, d, p, y, received)
         X1, P1, e, deviation, likely, nis = *told[:5], told[-1]
         size = ca.DM(whole.scale[:n])
         results = [X1, P1, X1[:n] * size, P1[:n, :n] * (size @ size.T), e, deviation, likely, nis]
         results = [ca.densify(each) for each in results]
-        return ca.Function("update", [X, P, u, y, received, d, p], results)
+        return ca.Function("update", [X, P, u, y, received, d, p, Q], results)
 
     @cached_property
     def _buffers(self) -> tuple:
-        """Arrays that the function reads and writes, and what runs it; d and p are set once."""
+        """Arrays that the function reads and writes, and what runs it; d, p and Q are set once."""
         f = self.function
         buffer, run = f.buffer()
         _, d, p = self.filter.plant.nominal
         arguments = [_empty(f.size_in(i), i == SPREAD) for i in range(f.n_in())]
         results = [_empty(f.size_out(i), i in (SPREAD, COVARIANCE)) for i in range(f.n_out())]
-        for place, value in zip(arguments[5:], (d, p), strict=True):
+        for place, value in zip(
+            arguments[5:], (d, p, self.filter.step_covariance.ravel()), strict=True
+        ):
             place[...] = value
         for i, each in enumerate(arguments):
             if each.size:

@@ -115,13 +115,13 @@ class PlantFilter:
     @cached_property
     def predict(self) -> ca.Function:
         """(X, P, u, d, p) -> (X, P, F) one step later; u and d have one column per sample."""
-        sizes = [self._predict.size_in(i) for i in range(5)]
+        sizes = [self.predict_gaining.size_in(i) for i in range(5)]
         symbols = [ca.MX.sym(f"i{i}", *size) for i, size in enumerate(sizes)]
-        results = self._predict(*symbols, self.step_covariance)
+        results = self.predict_gaining(*symbols, self.step_covariance)
         return ca.Function("predict", symbols, results)
 
     @cached_property
-    def _predict(self) -> ca.Function:
+    def predict_gaining(self) -> ca.Function:
         """(X, P, u, d, p, Q) -> (X, P, F) with what X gains in a step."""
         plant, model = self.plant, self.plant.model
         n, n_w = len(model.states), len(self.unknown_inputs)
@@ -193,7 +193,7 @@ class PlantFilter:
         (X, P, u, d, p, y, received, Q) with X and P predicted and Q what X gains in a step ->
         (X and P predicted for the next sample, F, then what :attr:`correct` gives)
         """
-        once, following = self.correct, self._predict
+        once, following = self.correct, self.predict_gaining
         symbols = [ca.MX.sym(f"i{i}", *once.size_in(i)) for i in range(once.n_in())]
         symbols[2:4] = (ca.MX.sym(k, *following.size_in(i)) for i, k in ((2, "u"), (3, "d")))
         X, P, u, d, p, y, received = symbols

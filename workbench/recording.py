@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -67,6 +67,22 @@ class Recording:
         """The gap-free pieces, in order."""
         ends = (*self.starts[1:], len(self))
         return tuple(self.part(a, b) for a, b in zip(self.starts, ends, strict=True))
+
+
+def joined(recordings: Sequence[Recording]) -> Recording:
+    """Recordings of one clock as the pieces of one, with the channels that all of them have.
+
+    Time runs on from one to the next; nothing is simulated across.
+    """
+    first, *others = recordings
+    if not others:
+        return first
+    shared = [c for c in first.channels if all(c in other.channels for other in others)]
+    channels = {c: np.concatenate([each[c] for each in recordings]) for c in shared}
+    ends = np.cumsum([0, *(len(each) for each in recordings)]).tolist()
+    starts = [end + s for end, each in zip(ends, recordings, strict=False) for s in each.starts]
+    name = " + ".join(each.name for each in recordings)
+    return replace(first, name=name, channels=channels, starts=tuple(starts))
 
 
 def same_data(one: Recording, other: Recording) -> bool:

@@ -11,10 +11,13 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer.core import TyperCommand
+
+if TYPE_CHECKING:
+    from studies.workers import Workers
 
 DONE, NO, WRONG_INPUT, SOLVER_FAILED, STOPPED = 0, 1, 2, 3, 130
 DEBUG = "WORKBENCH_DEBUG"  # set to anything, what is unforeseen is shown in full
@@ -69,6 +72,12 @@ Figures = Annotated[
     Path | None, typer.Option("--figures", metavar="DIR", help="Write figures into this folder.")
 ]
 Json = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Write as JSON too.")]
+ProcessCount = Annotated[
+    int | None, typer.Option("--workers", metavar="K", min=1, help="Processes; all cores.")
+]
+Scheduler = Annotated[
+    str, typer.Option("--scheduler", metavar="tcp://HOST:PORT", help="Of a Dask cluster.")
+]
 Output = Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="File to write.")]
 
 
@@ -134,6 +143,22 @@ def _unforeseen(error: Exception) -> str:
     """One line for what nobody foresaw, with the way to its details."""
     said = f"{type(error).__name__} {error}".strip().split("\n")[0]
     return f"inside the program: {said}; {DEBUG}=1 shows where"
+
+
+def workers_of(processes: int | None, scheduler: str) -> Workers:
+    """Where pieces of work are done.
+
+    Raises
+    ------
+    InputError
+        If both are named.
+    """
+    from studies.workers import Workers
+    from workbench.errors import InputError, Message
+
+    if processes and scheduler:
+        raise InputError(Message("a cluster has its own workers", "--workers", "no --scheduler"))
+    return Workers(processes or 0, scheduler)
 
 
 def example(command: str) -> str:

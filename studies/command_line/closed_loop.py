@@ -10,20 +10,22 @@ from studies.command_line.application import (
     NO,
     Figures,
     Json,
+    ProcessCount,
     Quiet,
     RigFile,
+    Scheduler,
     Spread,
     answering,
     app,
     command_text,
     example,
+    workers_of,
 )
 from studies.command_line.files import writable, write_json
 
 if TYPE_CHECKING:
     from studies.specification import Specification
     from studies.verdicts import Judged
-    from studies.workers import Workers
     from workbench.rig import Rig
 
 DesignFile = Annotated[Path, typer.Argument(metavar="DESIGN", help="What `design` wrote.")]
@@ -40,7 +42,9 @@ def check(
     estimator: Annotated[
         list[str] | None,
         typer.Option(
-            "--estimator", metavar="NAME", help="ekf (usual), ukf, imm, mhe; not for shifts."
+            "--estimator",
+            metavar="NAME",
+            help="ekf (usual), ukf, imm, mhe, kalman; not for shifts; by mode: ekf,ukf@stick.",
         ),
     ] = None,
     scenario: Annotated[
@@ -50,12 +54,8 @@ def check(
         ),
     ] = None,
     runs: Annotated[int, typer.Option("--runs", metavar="N", min=1, help="Plants to draw.")] = 1,
-    workers: Annotated[
-        int | None, typer.Option("--workers", metavar="K", min=1, help="Processes; all cores.")
-    ] = None,
-    scheduler: Annotated[
-        str, typer.Option("--scheduler", metavar="tcp://HOST:PORT", help="Of a Dask cluster.")
-    ] = "",
+    workers: ProcessCount = None,
+    scheduler: Scheduler = "",
     keep: Annotated[
         Path | None,
         typer.Option("--keep", metavar="FILE.jsonl", help="Keep runs; a second start goes on."),
@@ -74,14 +74,15 @@ def check(
 
     With --runs N > 1 the plant's parameters are drawn from their uncertainty, and the estimator
     keeps the rig's own values.  Runs are the same whatever the number of workers; a loop that is
-    lost counts as missed.
+    lost counts as missed.  With --figures also tables as CSV and LaTeX, and a report.
     """
     with answering(quiet) as say:
         from studies.checked_runs import check_rig
+        from studies.tables import noted_tables
         from workbench.rig import load_rig
 
         writable(json, keep, folders=[figures])
-        where = _workers(workers, scheduler, runs)
+        where = workers_of(workers or (1 if runs == 1 and not scheduler else None), scheduler)
         known = load_rig(rig)
         asked = _asked(spec, known, scenario or ()) if spec else None
         found = check_rig(
@@ -89,29 +90,19 @@ def check(
             spec=asked, runs=runs, workers=where, keep=keep, say=say,
         )  # fmt: skip
         write_json(json, found.document)
+        with noted_tables() as noted:
+            typer.echo(found.text)
         if figures:
-            from studies.figures.style import save_all
+            from studies.report.checks import report_check
 
             say("drawing")
-            save_all(found.figures(), figures, command_text())
-            say(f"figures in {figures}")
-        typer.echo(found.text)
+            say(f"figures, tables and {report_check(found, noted, figures, command_text())}")
         if found.judged:
             tell_missed(found.judged)
         elif not found.met:
             typer.echo(found.found.goal, err=True)
         if not found.met:
             raise typer.Exit(NO)
-
-
-def _workers(processes: int | None, scheduler: str, runs: int) -> "Workers":
-    """Where runs are worked on; one run in this process, unless there is a cluster."""
-    from studies.workers import Workers
-    from workbench.errors import InputError, Message
-
-    if processes and scheduler:
-        raise InputError(Message("a cluster has its own workers", "--workers", "no --scheduler"))
-    return Workers(1 if runs == 1 else processes or 0, scheduler)
 
 
 def _asked(spec: Path, rig: "Rig", scenarios: Iterable[str]) -> "Specification":

@@ -1,8 +1,7 @@
 """Commands on modes and controllers: modes, design."""
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -19,9 +18,6 @@ from studies.command_line.application import (
 )
 from studies.command_line.closed_loop import Spec, tell_missed
 from studies.command_line.files import read_all, writable, write_json
-
-if TYPE_CHECKING:
-    from controllers.design_file import Design
 
 
 @app.command(cls=Spread, epilog=example("workbench modes rig.toml --export modes"))
@@ -89,7 +85,7 @@ def design(
         typer.Option(
             "--controller",
             metavar="METHOD",
-            help="pid, lq, mpc, cascade, nonlinear-mpc for a drive; axis-lq, axis-pid, "
+            help="pid, lq, mpc, cascade, per-mode, nonlinear-mpc for a drive; axis-lq, axis-pid, "
             "feedback-linearisation for any axis; joint-lq, pressure, hybrid-mpc.",
         ),
     ],
@@ -104,6 +100,7 @@ def design(
     with answering(quiet) as say:
         from controllers.design_file import design as design_controller
         from controllers.design_file import gains, write_design
+        from studies.design_text import design_texts
         from studies.specification import design_numbers, read_specification
         from workbench.rig import load_rig
 
@@ -116,12 +113,8 @@ def design(
         write_design(found, output)
         for name, gain in gains(found.controller):
             typer.echo(f"{name}: {gain}")
-        if found.method == "hybrid-mpc":
-            from studies.design_text import search_text
-
-            typer.echo(search_text(found.controller))
-        else:
-            _certify(found, say)
+        for part in design_texts(found, say):
+            typer.echo(part)
         typer.echo(f"wrote {output}")
         if asked and asked.asked:
             from studies.checked_runs import check_rig
@@ -129,21 +122,3 @@ def design(
             judged = check_rig(known, output, spec=asked, say=say).judged
             typer.echo("\n" + judged.text)
             tell_missed(judged)
-
-
-def _certify(found: "Design", say: Callable[[str], None]) -> None:
-    """Print the margins of each mode, and what is certified across modes."""
-    from controllers.certificate import certificate
-    from controllers.margins import loops, margins, unforeseen_s
-    from studies.design_text import NO_LAWS, certificate_text, margins_text
-
-    made, delay_s = found.controller, unforeseen_s(found.plant)
-    if not hasattr(made, "laws") and not hasattr(made, "regulators"):
-        typer.echo(NO_LAWS)
-        return
-    for part in getattr(made, "regulators", (made,)):
-        axis = getattr(part, "axis", None)
-        loop = (found.hybrid, part.laws, made.sample_time_s, delay_s, axis)
-        typer.echo(margins_text(margins(*loop), delay_s))
-        say("looking for a certificate across modes")
-        typer.echo(certificate_text(certificate(loops(*loop), made.sample_time_s)))

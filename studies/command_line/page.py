@@ -1,5 +1,6 @@
 """The command that serves the local page."""
 
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
@@ -22,13 +23,13 @@ def serve_page(
 ) -> None:
     """The same loop as a local page: this machine alone, an address with a token of its own."""
     with answering(quiet=True):
+        from studies.page.jobs import begin
         from workbench.errors import InputError, Message
 
-        try:
-            import bokeh  # noqa: F401
-        except ImportError:
+        if not find_spec("bokeh"):
             what = "the page needs the package bokeh, which is not installed"
-            raise InputError(Message(what, expected="`pip install 'workbench[page]'`")) from None
+            raise InputError(Message(what, expected="`pip install 'workbench[page]'`"))
+        begin()  # beside the imports of the server
         from studies.page.server import serve
 
         said = "the page is at {}\nwhoever has this address can use it; Ctrl-C ends it"

@@ -34,8 +34,9 @@ def report(
 ) -> None:
     """One self-contained HTML file from what a folder holds."""
     with answering(quiet) as say:
-        from studies.report import PAGE, render_folder
+        from studies.report import PAGE
+        from studies.report.studies import render
 
         writable(folder / PAGE)
         say(f"reading {folder}")
-        typer.echo(f"wrote {render_folder(folder)}")
+        typer.echo(f"wrote {render(folder)}")

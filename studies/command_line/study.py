@@ -1,11 +1,22 @@
-"""The command that runs a study."""
+"""The command that runs studies."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from studies.command_line.application import Quiet, Spread, answering, app, command_text, example
+from studies.command_line.application import (
+    NO,
+    ProcessCount,
+    Quiet,
+    Scheduler,
+    Spread,
+    answering,
+    app,
+    command_text,
+    example,
+    workers_of,
+)
 
 
 @app.command(cls=Spread, epilog=example("workbench study hidden-effects -o studies_out"))
@@ -17,22 +28,37 @@ def study(
     full: Annotated[
         bool, typer.Option("--full", help="The whole grid, which may take hours; it resumes.")
     ] = False,
+    workers: ProcessCount = None,
+    scheduler: Scheduler = "",
     quiet: Quiet = False,
 ) -> None:
     """Run a study: its table, what it claims beside what came out, figures and numbers.
 
     Finished pieces stay in the folder; a second start goes on.  Exit code 1 where a claim fails.
+
+    Draws go to all cores, or to a cluster.  Of all studies as many run at a time as there are
+    cores; those that the same code has finished are not run again, and the report has all.
     """
     with answering(quiet) as say:
         from studies.command_line.files import writable
-        from studies.running import chosen, run_study
+        from studies.report.studies import report_studies
+        from studies.running import ALL, chosen, run_all, run_study
         from studies.study import Extent
+        from studies.workers import working_with
 
         writable(folders=[output])
         extent = Extent.FULL if full else Extent.QUICK
-        hold = [
-            run_study(each, output / each.name, extent, command_text(), say, typer.echo)
-            for each in chosen(name)
-        ]
-    if not all(hold):
-        raise typer.Exit(1)
+        where, asked = workers_of(workers, scheduler), chosen(name)
+        if name == ALL and not scheduler:
+            failed = run_all(asked, output, extent, where.count, say, typer.echo, quiet)
+        else:
+            failed = []
+            for each in asked:
+                with working_with(where):
+                    folder = output / each.name
+                    failed += run_study(each, folder, extent, command_text(), say, typer.echo)
+        typer.echo(f"\nwrote {report_studies(output, command_text())}")
+    for told in failed:
+        typer.echo(f"does not hold: {told}", err=True)
+    if failed:
+        raise typer.Exit(NO)

@@ -23,7 +23,15 @@ from studies.page.look import (
     text,
 )
 from studies.page.session import Role, Session, Step, recordings
-from studies.page.verbs import add_action, back_to, fit_action, require_train, save, with_accepted
+from studies.page.verbs import (
+    add_action,
+    back_to,
+    fit_action,
+    require_rig,
+    require_train,
+    save,
+    with_accepted,
+)
 from studies.text import number, shown
 from studies.text_of_results import spread, unit_names
 from workbench.units import public_name
@@ -72,6 +80,10 @@ class AddTab:
             row(self._name, button("Save rig", self._save, main=True, name="save_rig")),
         )  # fmt: skip
 
+    def of(self, session: Session) -> tuple[Any, ...]:
+        """Parts of a session that it shows."""
+        return session.steps, session.offered
+
     def show(self, session: Session) -> None:
         """The steps of a session, and what may be added."""
         from bokeh.models import CheckboxGroup
@@ -109,7 +121,8 @@ class AddTab:
         steps = len(page.session.steps) - 1
         gone, come = sorted({*old} - {*new}), sorted({*new} - {*old})
         if gone and gone[0] < steps:
-            page.attempt(lambda session: back_to(session, gone[0]))
+            if not page.attempt(lambda session: back_to(session, gone[0])):
+                self._untick()
         elif come and come[0] >= steps:
             self._add(self._names[come[0]])
 
@@ -123,25 +136,28 @@ class AddTab:
 
     def _fit(self) -> None:
         page = self._page
-        if page.attempt(lambda session: session.now and session):
+        if page.allows(require_rig):
             self._start(fit_action(page.session), tasks.fit)
 
     def _start(self, action: Any, task: Any, *more: str) -> None:
         """A job that gives the rig another step."""
         page = self._page
 
-        def ready(session: Session) -> Session:
-            require_train(session)
-            return session
+        if not page.allows(require_train):
+            self._untick()
+            return
+        session = page.session
+        page.work(
+            action,
+            lambda found: lambda now: with_accepted(now, found, action),
+            task, session.now.rig, *more,
+            recordings(session.of(Role.TRAINING)), recordings(session.of(Role.VALIDATION)),
+            otherwise=self._untick,
+        )  # fmt: skip
 
-        if page.attempt(ready):
-            session = page.session
-            page.work(
-                action,
-                lambda found: lambda now: with_accepted(now, found, action),
-                task, session.now.rig, *more,
-                recordings(session.of(Role.TRAINING)), recordings(session.of(Role.VALIDATION)),
-            )  # fmt: skip
+    def _untick(self) -> None:
+        """What was not accepted."""
+        self._ticks.active = [*range(len(self._page.session.steps) - 1)]
 
     def _save(self) -> None:
         target = self._name.value

@@ -25,9 +25,8 @@ from studies.page.look import (
 from studies.page.residual_tests import ResidualTests
 from studies.page.session import Session, recordings
 from studies.page.traces import TIME, Traces, inside, on_box
-from studies.page.verbs import compare_action, with_compared
+from studies.page.verbs import compare_action, require_used, with_compared
 from studies.text import labelled, percent
-from workbench.errors import InputError, Message
 from workbench.units import display_unit, public_name
 
 if TYPE_CHECKING:
@@ -38,7 +37,8 @@ if TYPE_CHECKING:
     from studies.page.view import Page
     from workbench.comparison.compare import RecordingComparison
 
-OVERLAY, ERROR, SCATTER = 112, 84, 190
+OVERLAY, ERROR, SCATTER = 112, 84, 190  # heights
+WORST = 5  # % of the samples
 
 
 class CompareTab:
@@ -83,6 +83,7 @@ class CompareTab:
             guide("See how well the plant tells what was recorded, one step ahead, over windows "
                   "and as a free run, and where it fails."),
             row(compare, *self._choices.values(), self._window,
+                button(f"Select the worst {WORST} %", self._worst, name="worst"),
                 button("Clear selection", self._clear)),
             self._lit,
             row(self._left, self._right, top=True),
@@ -90,6 +91,10 @@ class CompareTab:
             self._regimes,
             self._notes,
         )  # fmt: skip
+
+    def of(self, session: Session) -> tuple[Any, ...]:
+        """Parts of a session that it shows."""
+        return (session.compared,)
 
     def show(self, session: Session) -> None:
         """The comparison of a session."""
@@ -112,12 +117,7 @@ class CompareTab:
     def _compare(self) -> None:
         page = self._page
 
-        def ready(session: Session) -> Session:
-            if not session.used:
-                raise InputError(Message("no recording is open", expected="one in the first tab"))
-            return session
-
-        if page.attempt(ready):
+        if page.allows(require_used):
             session = page.session
             page.work(
                 compare_action(session),
@@ -248,6 +248,14 @@ class CompareTab:
         """Light up what lies in a box of any picture."""
         field = f"e:{self._full()}" if y else None
         self._traces.select(inside(self._traces.rows, x, field, box))
+        self._tell()
+
+    def _worst(self) -> None:
+        """Light up the largest residuals of the chosen output: a box without a mouse."""
+        if self._of is None:
+            return
+        error = np.abs(self._traces.rows[f"e:{self._full()}"])
+        self._traces.select(error >= np.nanpercentile(error, 100 - WORST))
         self._tell()
 
     def _clear(self) -> None:

@@ -6,26 +6,22 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from controllers.design_file import Design, design, write_design
+from controllers.design_file import design, write_design
 from linearize.cuts import Interval
 from linearize.hybrid_simulation import sampled_hybrid
 from linearize.modes import HybridModel
 from linearize.prediction import prediction_of
-from linearize.standard import SHIFT_MODES
 from linearize.stopped import has_stops
 from linearize.visits import joined, recorded_visits, windows
-from studies.checking import loops_of, recorded_runs, styled_figures
-from studies.closed_loop_check import Check
-from studies.design_text import certificate_text, margins_text, search_text
-from studies.figures.modes import pole_figure
+from studies.checking import Checked, loops_of, recorded_runs, styled_figures
+from studies.design_text import design_texts
 from studies.mode_choice import FINE, chosen_modes, regions_of
-from studies.mode_pictures import map_figure, step_figure, step_of
-from studies.mode_views import VIEWS, view_of
+from studies.mode_pictures import figures_of_modes
 from studies.modes_text import modes_text
 from studies.page.drawn import drawings
 from studies.page.mode_cuts import cuts_of
-from studies.shift_check import ShiftCheck
 from studies.specification import design_numbers, read_specification
+from studies.text import number
 from workbench.errors import whole_file
 from workbench.recording import Recording
 from workbench.rig import Rig
@@ -43,7 +39,7 @@ class ModeChoice:
     cuts: str = field(default="", repr=False)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Linearised:
     """Modes as text and drawings, their cuts, and their error over 50 ms, in shares of a scale."""
 
@@ -55,41 +51,44 @@ class Linearised:
     count: int
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Looped:
-    """A design, what is certified of it, and its closed loops with the plants of the runs."""
+    """A design, what is known of it piece by piece, and its closed loops."""
 
     design_file: str
-    told: str = field(repr=False)
-    check: Check | ShiftCheck = field(repr=False)
+    told: tuple[str, ...] = field(repr=False)
+    check: Checked = field(repr=False)
     drawn: Mapping[str, str] = field(repr=False)
 
 
 def linearise(
     rig: Rig, recordings: Sequence[Recording], choice: ModeChoice, say: Say
 ) -> Linearised:
-    """Modes, their maps, where they predict, and how well on the recordings."""
+    """Modes, how well they predict on the recordings, told at once, where, and their maps."""
     say("linearising")
-    cuts = Path(choice.cuts_file) if choice.cuts_file else None
-    if cuts:
-        with whole_file(cuts) as unfinished:
+    if choice.cuts_file:
+        with whole_file(Path(choice.cuts_file)) as unfinished:
             unfinished.write_text(choice.cuts, encoding="utf-8")
-    placed_on = recordings if choice.placed is not None else ()
-    hybrid = chosen_modes(rig, placed_on, choice.placed, choice.regimes, cuts)
-    regions = regions_of(hybrid, None, None, say)
-    say("drawing")
-    figures = {"poles": pole_figure(hybrid)}
-    if hybrid.plant.name in VIEWS:
-        modes = sampled_hybrid(hybrid, view_of(hybrid).sample_time_s)
-        figures |= {"map": map_figure(modes), "step": step_figure(step_of({"modes": hybrid}))}
+    hybrid = modes_of(rig, recordings, choice)
+    error = _error(rig, hybrid, recordings, say)
+    known = f"prediction error {number(100.0 * error, 3)} %; " if recordings else ""
+    regions = regions_of(hybrid, None, None, lambda message: say(known + message))
+    say(known + "drawing")
     return Linearised(
         choice,
         modes_text(hybrid, regions),
-        drawings(figures),
+        drawings(figures_of_modes(hybrid)),
         cuts_of(hybrid),
-        _error(rig, hybrid, recordings, say),
+        error,
         len(hybrid.modes),
     )
+
+
+def modes_of(rig: Rig, recordings: Sequence[Recording], choice: ModeChoice) -> HybridModel:
+    """The modes of a choice; its file of cuts is there."""
+    cuts = Path(choice.cuts_file) if choice.cuts_file else None
+    placed_on = recordings if choice.placed is not None else ()
+    return chosen_modes(rig, placed_on, choice.placed, choice.regimes, cuts)
 
 
 def _error(rig: Rig, hybrid: HybridModel, recordings: Sequence[Recording], say: Say) -> float:
@@ -123,21 +122,7 @@ def close_loops(
     found = design(method, rig.plant, numbers)
     path = Path(target)
     write_design(found, path)
-    shifts = rig.plant.name in SHIFT_MODES
-    told = search_text(found.controller) if shifts else _certified(found, say)
-    observers = () if shifts else estimators
-    loops = loops_of(rig, {path: path.read_text(encoding="utf-8")}, observers, scenarios)
+    told = tuple(design_texts(found, say))
+    loops = loops_of(rig, {path: path.read_text(encoding="utf-8")}, estimators, scenarios)
     checked = recorded_runs(loops, runs, say)
     return Looped(target, told, checked, drawings(styled_figures(checked)))
-
-
-def _certified(found: Design, say: Say) -> str:
-    """Margins of each mode, and what is certified across modes."""
-    from controllers.certificate import certificate
-    from controllers.margins import loops, margins, unforeseen_s
-
-    made, delay_s = found.controller, unforeseen_s(found.plant)
-    loop = (found.hybrid, made.laws, made.sample_time_s, delay_s)
-    told = margins_text(margins(*loop), delay_s)
-    say("looking for a certificate across modes")
-    return f"{told}\n{certificate_text(certificate(loops(*loop), made.sample_time_s))}"

@@ -13,6 +13,7 @@ from studies.page.session import Role, Session, did, paths
 
 if TYPE_CHECKING:
     from studies.page.control_tasks import Linearised, Looped, ModeChoice
+    from studies.page.offers import Offers
 
 
 def modes_action(session: Session, choice: ModeChoice) -> Action:
@@ -35,6 +36,11 @@ def with_linearised(session: Session, found: Linearised, action: Action) -> Sess
     """Modes that were made; those before them stay to be compared with."""
     done = replace(session, linearised=found, linearised_before=session.linearised)
     return did(done, action)
+
+
+def with_offers(session: Session, found: Offers) -> Session:
+    """What each method bears in each mode; it changes nothing, so it is no action."""
+    return replace(session, offers=found)
 
 
 def design_action(
@@ -79,6 +85,8 @@ def report_action(session: Session, folder: str) -> Action:
         given.append("diagnosis=diagnosis")
     if len(session.steps) > 1:
         given.append("steps=steps")
+    if session.linearised:
+        given.append("hybrid=hybrid")
     if session.looped:
         given.append("check=looped.check")
     words = command("report", folder)

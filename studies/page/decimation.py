@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 ENDS = np.inf, -np.inf  # in place of NaN, where the smallest and the largest are sought
-MOST_POINTS = 2400  # of a picture: four for each of its pixels across
+MOST_POINTS = 1200  # of a picture: two for each of its pixels across
 
 
 def peaks(rows: np.ndarray, first: int, last: int, most: int = MOST_POINTS) -> np.ndarray:

@@ -15,6 +15,7 @@ import traceback
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from multiprocessing import forkserver
 from multiprocessing.connection import Connection
 from typing import Any
 
@@ -88,6 +89,12 @@ class Job:
                 _end_group(self._process.pid, how)
                 self._process.join(PATIENCE_S)
         self._receiver.close()
+
+
+def begin() -> None:
+    """Start the server of processes, which takes a while to import what jobs need."""
+    prepared()
+    forkserver.ensure_running()
 
 
 def prepared() -> Any:

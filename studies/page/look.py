@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from html import escape
 from typing import TYPE_CHECKING, Any
 
-from studies.figures.style import BLUE, GREEN, ORANGE, RED
+from studies.figures.style import BLUE, ORANGE, RED
 from studies.page.plausibility import Finding, Mark
 
 if TYPE_CHECKING:
@@ -14,7 +14,11 @@ if TYPE_CHECKING:
     from bokeh.plotting import figure
 
 INK, SOFT, RULE, MEASURED = "#1f2933", "#52606d", "#d9dee4", "#7b8794"
-MARKS = {Mark.GOOD: (GREEN, "✓ good"), Mark.LOOK: ("#8a5a00", "▲ look"), Mark.STOP: (RED, "■ stop")}
+MARKS = {
+    Mark.GOOD: ("#00694d", "✓ good"),
+    Mark.LOOK: ("#8a5a00", "▲ look"),
+    Mark.STOP: ("#a34700", "■ stop"),
+}  # colours dark enough to be read as text
 FONT = "system-ui, -apple-system, 'Segoe UI', 'DejaVu Sans', sans-serif"
 GAP = 12
 NARROWEST = 240  # of a chart: one that begins narrower leaves a stripe
@@ -23,6 +27,8 @@ SMALL = 130  # of a chart: then few ticks
 STYLE = f"""
 body {{ margin: 0; background: #ffffff; color: {INK}; font: 14px {FONT}; }}
 :focus-visible {{ outline: 3px solid {ORANGE}; outline-offset: 1px; }}
+#loading {{ font-size: 18px; margin: 12px 20px; }}
+[data-root-id]:not(:empty) ~ #loading {{ display: none; }}
 """
 TEXT = f"""
 :host {{ font: 14px/1.45 {FONT}; color: {INK}; }}
@@ -42,7 +48,10 @@ table {{ border-collapse: collapse; font-variant-numeric: tabular-nums; }}
 th {{ text-align: left; font-weight: 600; border-bottom: 1px solid {INK};
      padding: 2px 14px 2px 0; }}
 td {{ border-bottom: 1px solid {RULE}; padding: 2px 14px 2px 0; vertical-align: top; }}
-td.n, th.n {{ text-align: right; }}
+td.n, th.n {{ text-align: right; white-space: nowrap; }}
+td.k, th.k {{ white-space: nowrap; }}
+.wide {{ overflow-x: auto; max-width: calc(100vw - 48px); }}
+.wide:focus-visible {{ outline: 3px solid {ORANGE}; }}
 """
 BUTTON = f"""
 .bk-btn {{ font: 14px {FONT}; border-radius: 4px; min-height: 32px; }}
@@ -84,8 +93,7 @@ def put(place: Div, html: str) -> None:
 
 def wide(table: str) -> str:
     """A table of a terminal, which is scrolled where it is wider than the page."""
-    style = "white-space: pre; overflow-x: auto; max-width: calc(100vw - 60px)"
-    return f'<pre style="{style}" tabindex="0">{escape(table)}</pre>'
+    return f'<pre class="wide" style="white-space: pre" tabindex="0">{escape(table)}</pre>'
 
 
 def guide(sentence: str) -> Div:
@@ -155,16 +163,25 @@ def chart(x: str, y: str, height: int = 200, title: str = "", **more: Any) -> fi
     return found
 
 
-def html_table(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: int = 1) -> str:
-    """A table; columns from ``numbers`` on are flush right."""
+def html_table(
+    head: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    numbers: int = 1,
+    names: Sequence[int] = (0,),
+) -> str:
+    """A table, scrolled where it is wider than the page.
+
+    Columns from ``numbers`` on are flush right; those of ``names`` do not break into lines.
+    """
 
     def cell(kind: str, k: int, word: str) -> str:
-        flush = ' class="n"' if k >= numbers else ""
-        return f"<{kind}{flush}>{escape(str(word))}</{kind}>"
+        of = "n" if k >= numbers else "k" if k in names else ""
+        return f'<{kind} class="{of}">{escape(str(word))}</{kind}>'
 
     lines = ["".join(cell("th", k, word) for k, word in enumerate(head))]
     lines += ["".join(cell("td", k, word) for k, word in enumerate(each)) for each in rows]
-    return "<table>" + "".join(f"<tr>{line}</tr>" for line in lines) + "</table>"
+    inside = "".join(f"<tr>{line}</tr>" for line in lines)
+    return f'<div class="wide" tabindex="0"><table>{inside}</table></div>'
 
 
 def findings_html(found: Sequence[Finding]) -> str:
@@ -173,7 +190,7 @@ def findings_html(found: Sequence[Finding]) -> str:
     for each in found:
         colour, word = MARKS[each.mark]
         lines.append(
-            f'<tr><td style="color:{colour};white-space:nowrap">{word}</td>'
-            f"<td>{escape(each.what)}</td><td>{escape(each.seen)}</td></tr>"
+            f'<tr><td class="k" style="color:{colour}">{word}</td>'
+            f'<td class="k">{escape(each.what)}</td><td>{escape(each.seen)}</td></tr>'
         )
-    return "<table>" + "".join(lines) + "</table>"
+    return f'<div class="wide" tabindex="0"><table>{"".join(lines)}</table></div>'

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from studies.page import tasks
 from studies.page.look import button, column, row, text
 from studies.page.plausibility import column_names
-from studies.page.replay import Action
+from studies.page.replay import NO_ACTION, Action
 from studies.page.session import TIME, Session, mapped, paths, with_opened, with_rig
 from workbench.errors import InputError, whole_file
 from workbench.recording_format import channel_names
@@ -127,4 +127,4 @@ class Mapping:
                 return with_all
 
             every = tuple(paths([each.opened for each in before]))
-            page.work(Action("", ""), reread, tasks.open_recordings, page.session.now.rig, every)
+            page.work(NO_ACTION, reread, tasks.open_recordings, page.session.now.rig, every)

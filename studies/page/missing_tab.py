@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from workbench.diagnosis.result import Ranked
 
 SHOWN = 10
-BAR = 30
+BAR, LETTER = 30, 7  # pixels of a row, and of a letter of its name
 
 
 class MissingTab:
@@ -61,10 +61,14 @@ class MissingTab:
             self._save,
         )  # fmt: skip
 
+    def of(self, session: Session) -> tuple[Any, ...]:
+        """Parts of a session that it shows."""
+        return (session.diagnosed,)
+
     def show(self, session: Session) -> None:
         """The diagnosis of a session."""
         found = session.diagnosed
-        self._term.show(found.where if found else None)
+        self._term.show(found.terms if found else {})
         asked = found.next_recording if found else None
         self._save.visible = bool(asked and asked.predicted)
         if found is None:
@@ -85,11 +89,7 @@ class MissingTab:
     def _diagnose(self) -> None:
         page = self._page
 
-        def ready(session: Session) -> Session:
-            require_train(session)
-            return session
-
-        if page.attempt(ready):
+        if page.allows(require_train):
             session = page.session
             page.work(
                 diagnose_action(session),
@@ -127,6 +127,7 @@ def _bars(rows: tuple[Ranked, ...]) -> Any:
             "y", 0.36, "x", source=source, color=colour, legend_label=word, hatch_pattern=hatch,
             hatch_color="white",
         )  # fmt: skip
+    found.min_border_left = 24 + LETTER * max(map(len, names))
     found.legend.location, found.legend.label_text_font_size = "bottom_right", "11px"
     found.yaxis.major_label_text_font_size = "12px"
     found.ygrid.grid_line_color = None
@@ -156,7 +157,7 @@ def _table(rows: tuple[Ranked, ...]) -> str:
         )  # fmt: skip
     head = ("effect", "validation", "size ± one deviation", "what it looks like", "")
     note = '<p class="guide">= cannot be told from the first; ? not to be seen here</p>'
-    return html_table(head, lines, numbers=9) + note
+    return html_table(head, lines, numbers=9, names=(0, 1, 2)) + note
 
 
 def signature(row: Ranked) -> str:

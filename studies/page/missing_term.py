@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +14,8 @@ from studies.text import labelled, percent
 from workbench.units import display_scale, display_unit, public_name, suffix
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from bokeh.models import Model
 
     from workbench.diagnosis.missing_term import Dependence
@@ -26,23 +29,46 @@ LITRES_PER_MIN = 6e4 / ANR_KG_M3
 class MissingTerm:
     """Which balance lacks something, the term over time, and over its drivers."""
 
+    def __init__(self) -> None:
+        self._terms: Mapping[str, Where] = {}
+
     def build(self) -> Model:
         """Its widgets."""
-        self._head, self._charts = text(), column()
-        return column(self._head, self._charts)
+        from bokeh.models import Select
 
-    def show(self, where: Where | None) -> None:
-        """The missing term of a diagnosis."""
-        put(self._head, "")
+        self._head, self._told, self._charts = text(), text(), column()
+        self._balance = Select(title="Look at the balance", options=[], width=260, name="balance")
+        self._balance.on_change("value", lambda _a, _o, _n: self._draw())
+        self._choice = row(self._balance)
+        self._choice.visible = False
+        return column(self._head, self._choice, self._told, self._charts)
+
+    def show(self, terms: Mapping[str, Where]) -> None:
+        """The missing terms of a diagnosis by balance, the worst first."""
+        self._terms = {_words(name): where for name, where in terms.items()}
+        self._choice.visible = bool(terms)
+        self._balance.options = names = [*self._terms]
+        first = names[0] if names else ""
+        put(
+            self._head,
+            f"<h2>Where the plant fails: the balance {escape(first)}</h2>" if first else "",
+        )
+        if self._balance.value == first:
+            self._draw()
+        else:
+            self._balance.value = first
+
+    def _draw(self) -> None:
+        """The term of the chosen balance."""
+        put(self._told, "")
         self._charts.children = []
+        where = self._terms.get(self._balance.value)
         if where is None:
             return
         factor, unit = in_people(where.term_name)
-        name = public_name(where.balance).replace("_", " ").replace(".", " ")
         flow = public_name(where.term_name).replace("_", " ")
         told = f"What an unknown {flow} would have to be ({unit}), one deviation shaded."
-        head = f"<h2>Where the plant fails: the balance {name}</h2>"
-        put(self._head, f'{head}<p class="guide">{told}</p>')
+        put(self._told, f'<p class="guide">{told}</p>')
         strongest = [each for each in where.against if each.bins.shape[1]][:SHOWN]
         below = [_dependence(each, factor, unit) for each in strongest]
         for each in below:
@@ -50,6 +76,10 @@ class MissingTerm:
         gained, term = _balances(where), _over_time(where, factor, unit)
         first = row(sharing(gained, 1, 320), sharing(term, 2, 520))
         self._charts.children = [first, row(*below, top=True)]
+
+
+def _words(balance: str) -> str:
+    return public_name(balance).replace("_", " ").replace(".", " ")
 
 
 def in_people(name: str) -> tuple[float, str]:
@@ -64,7 +94,7 @@ def _balances(where: Where) -> Any:
     from bokeh.models import FactorRange
 
     gains = sorted(where.by_balance.items(), key=lambda item: item[1])[-8:]
-    names = [name.replace(".", " ").replace("_", " ") for name, _ in gains]
+    names = [_words(name) for name, _ in gains]
     found = chart(
         "gained log-likelihood (-)", "", HEIGHT, "which balance lacks something",
         y_range=FactorRange(*names), tools="",

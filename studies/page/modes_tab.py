@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from studies.page.control_verbs import modes_action, with_linearised
 from studies.page.drawn import as_html
-from studies.page.look import button, column, guide, put, row, sharing, text, wide
+from studies.page.look import button, column, guide, put, row, text, wide
 from studies.page.session import Role, Session, recordings
+from studies.page.verbs import require_rig
 from studies.text import number
 from workbench.units import display_scale, display_unit, public_name
 
@@ -30,7 +31,6 @@ class ModesTab:
     def __init__(self, page: Page) -> None:
         self._page = page
         self._sliders: list[tuple[Any, Any]] = []
-        self._shown: Any = None
 
     def build(self) -> Model:
         """Its widgets."""
@@ -42,8 +42,6 @@ class ModesTab:
         self._error, self._table = text(name="mode_error"), text()
         self._cuts = column()
         self._drawn = [text() for _ in range(3)]
-        for each in self._drawn:
-            sharing(each, 1, 560)
         return column(
             guide("See the plant as linear modes, where each is active and how far it predicts; "
                   "move a boundary between modes and see the prediction error change."),
@@ -51,16 +49,17 @@ class ModesTab:
                 button("Linearise", self._linearise, main=True, name="linearise")),
             self._error,
             self._cuts,
-            row(*self._drawn, top=True),
+            *self._drawn,
             self._table,
         )  # fmt: skip
+
+    def of(self, session: Session) -> tuple[Any, ...]:
+        """Parts of a session that it shows."""
+        return session.linearised, session.linearised_before
 
     def show(self, session: Session) -> None:
         """The modes of a session."""
         found = session.linearised
-        if found is self._shown:
-            return
-        self._shown = found
         self._cuts.children = []
         if found is None:
             for each in (self._error, self._table, *self._drawn):
@@ -70,11 +69,11 @@ class ModesTab:
         change = ""
         if before is not None and before.error == before.error:
             change = f" (before {number(100.0 * before.error, 3)} %)"
-        put(self._error, (
-            f'<p role="status"><b>{found.count} modes; prediction error over 50 ms along the '
-            f"training recordings {number(100.0 * found.error, 3)} % of a state's scale{change}"
-            "</b></p>"
-        ))  # fmt: skip
+        said = f"{found.count} modes"
+        if found.error == found.error:
+            said += "; prediction error over 50 ms along the training recordings "
+            said += f"{number(100.0 * found.error, 3)} % of a state's scale{change}"
+        put(self._error, f'<p role="status"><b>{said}</b></p>')
         for place, name in zip(self._drawn, ("map", "step", "poles"), strict=True):
             put(place, as_html(found.drawn[name]) if name in found.drawn else "")
         put(self._table, wide(found.text))
@@ -118,9 +117,10 @@ class ModesTab:
         self._cut(dict(self._page.session.linearised.cuts))
 
     def _move(self) -> None:
-        """The modes with the boundaries where the sliders are."""
+        """The modes with the boundaries where the sliders are; those under way are not wanted."""
         from studies.page.mode_cuts import moved
 
+        self._page.cancel()
         changes = [
             (each, display_scale(each.signal).to_si(slider.value)) for each, slider in self._sliders
         ]
@@ -140,7 +140,7 @@ class ModesTab:
         from studies.page.control_tasks import linearise
 
         page = self._page
-        if not page.attempt(lambda session: session.now and session):
+        if not page.allows(require_rig):
             return
         session = page.session
         action = modes_action(session, choice)

@@ -19,7 +19,7 @@ from studies.page.look import (
     text,
 )
 from studies.page.mapping import Mapping
-from studies.page.replay import Action
+from studies.page.replay import NO_ACTION
 from studies.page.session import (
     File,
     Role,
@@ -32,7 +32,7 @@ from studies.page.session import (
     without_file,
 )
 from studies.page.traces import TIME, Traces
-from studies.page.verbs import require_train, with_checked
+from studies.page.verbs import require_rig, require_train, with_checked
 from studies.text import labelled
 from workbench.plants import PLANTS
 from workbench.units import display_scale
@@ -82,8 +82,8 @@ class RecordingTab:
             guide("Open a rig and its recordings, look whether they are plausible, and mark which "
                   "one is fitted (training) and which one only judges (validation)."),
             row(self._rig, button("Open rig", self._open_rig, name="open_rig"),
-                self._plant,
-                self._file, button("Add recording", self._add, name="add_recording"), self._here),
+                self._plant),
+            row(self._file, button("Add recording", self._add, name="add_recording"), self._here),
             self._files,
             row(button("Check before a fit", self._check, name="check_gate")),
             self._gate,
@@ -92,6 +92,10 @@ class RecordingTab:
             self._charts,
             self._mapping.build(),
         )  # fmt: skip
+
+    def of(self, session: Session) -> tuple[Any, ...]:
+        """Parts of a session that it shows."""
+        return session.steps, session.files, session.checked
 
     def show(self, session: Session) -> None:
         """The files of a session, and one of them drawn."""
@@ -126,7 +130,8 @@ class RecordingTab:
         )
 
     def _mark(self, path: str, role: Role) -> None:
-        self._page.attempt(lambda session: with_role(session, path, role))
+        if not self._page.attempt(lambda session: with_role(session, path, role)):
+            self.show(self._page.session)
 
     def _look(self, path: str) -> None:
         self._looked_at = path
@@ -149,10 +154,10 @@ class RecordingTab:
 
     def _add(self) -> None:
         path, page = self._file.value.strip(), self._page
-        if not page.attempt(lambda session: session.now and session):
+        if not page.allows(require_rig):
             return
         page.work(
-            Action("", ""),
+            NO_ACTION,
             lambda found: lambda session: with_opened(session, found),
             tasks.open_recordings, page.session.now.rig, (path,),
         )  # fmt: skip
@@ -160,13 +165,9 @@ class RecordingTab:
     def _check(self) -> None:
         page = self._page
 
-        def ready(session: Session) -> Session:
-            require_train(session)
-            return session
-
-        if page.attempt(ready):
+        if page.allows(require_train):
             page.work(
-                Action("", ""),
+                NO_ACTION,
                 lambda found: lambda session: with_checked(session, found),
                 tasks.check_gate, page.session.now.rig,
                 recordings(page.session.of(Role.TRAINING)),

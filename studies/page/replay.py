@@ -29,6 +29,9 @@ class Action:
     python: str
 
 
+NO_ACTION = Action("", "")  # of a job that only looks: nothing is told
+
+
 def command(*words: str) -> str:
     """A command of the workbench as it is typed."""
     return shlex.join(["workbench", *words])

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from studies.page.control_verbs import report_action, with_reported
 from studies.page.look import RULE, button, column, guide, put, row, text
-from studies.page.session import Session
+from studies.page.session import Role, Session, recordings
+from studies.page.verbs import require_rig
 
 if TYPE_CHECKING:
     from bokeh.models import Model
@@ -23,7 +24,6 @@ class ReportTab:
 
     def __init__(self, page: Page) -> None:
         self._page = page
-        self._shown: Any = None
 
     def build(self) -> Model:
         """Its widgets."""
@@ -39,12 +39,13 @@ class ReportTab:
             self._inside,
         )  # fmt: skip
 
+    def of(self, session: Session) -> tuple[Any, ...]:
+        """Parts of a session that it shows."""
+        return (session.reported,)
+
     def show(self, session: Session) -> None:
         """The report that was written last."""
         found = session.reported
-        if found is self._shown:
-            return
-        self._shown = found
         put(self._said, f"<p role='status'>wrote {escape(str(found))}</p>" if found else "")
         put(self._inside, "")
         if found:
@@ -56,22 +57,23 @@ class ReportTab:
             ))  # fmt: skip
 
     def _write(self) -> None:
-        from studies.page.reporting import Found, report
+        from studies.page.reporting import Found, report_with_modes
 
         page, target = self._page, self._folder.value.strip() or "report"
-
-        if not page.attempt(lambda session: session.now and session):
+        if not page.allows(require_rig):
             return
         session = page.session
         action = report_action(session, target)
         page.work(
             action,
             lambda found: lambda now: with_reported(now, found, action),
-            report, Path(target), action.command, session.now.rig.name,
+            report_with_modes, Path(target), action.command, session.now.rig,
             Found(
                 comparison=session.compared.comparison if session.compared else None,
                 diagnosis=session.diagnosed,
                 steps=tuple(step.accepted for step in session.steps if step.accepted),
                 check=session.looped.check if session.looped else None,
             ),
+            recordings(session.of(Role.TRAINING)),
+            session.linearised.choice if session.linearised else None,
         )  # fmt: skip

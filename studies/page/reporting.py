@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -11,17 +11,23 @@ from studies.checking import styled_figures
 from studies.figures.comparison import comparison_figures
 from studies.figures.diagnosis import diagnosis_figures
 from studies.figures.improvement import before_after_figure
-from studies.figures.style import save_all
+from studies.figures.style import save_all, styled
+from studies.mode_choice import regions_of
+from studies.mode_pictures import figures_of_modes
+from studies.modes_text import modes_text
+from studies.page.control_tasks import modes_of
 from studies.report.page import FIGURES, Section, write_report
 from studies.text_of_comparison import comparison_text
 from studies.text_of_results import before_after_text, moved_text, ranking_text, unit_names
 
 if TYPE_CHECKING:
-    from studies.closed_loop_check import Check
-    from studies.shift_check import ShiftCheck
+    from linearize.modes import HybridModel
+    from studies.checking import Checked
+    from studies.page.control_tasks import ModeChoice
     from workbench.comparison.compare import Comparison
     from workbench.diagnosis.result import Diagnosis
     from workbench.fitting.errors import Errors
+    from workbench.recording import Recording
     from workbench.rig import Rig
 
 
@@ -40,7 +46,8 @@ class Found:
     comparison: Comparison | None = field(default=None, repr=False)
     diagnosis: Diagnosis | Any = field(default=None, repr=False)
     steps: Sequence[Accepted] = ()
-    check: Check | ShiftCheck | None = field(default=None, repr=False)
+    hybrid: HybridModel | None = field(default=None, repr=False)
+    check: Checked | None = field(default=None, repr=False)
 
 
 def report(
@@ -68,8 +75,28 @@ def report(
         drawn = {f"step_{number}": before_after_figure(step.before, step.after, units)}
         note = step.rig.notes[-1] if step.rig.notes else ""
         tell(f"Step {number}", note, table, drawn)
+    if found.hybrid:
+        say("where each mode predicts")
+        table = modes_text(found.hybrid, regions_of(found.hybrid, None, None, say))
+        with styled():
+            drawn = figures_of_modes(found.hybrid)
+        tell("The plant as modes", "", table, drawn)
     if found.check:
         tell("Closed loops", "", found.check.text, styled_figures(found.check))
     if not sections:
         sections.append(Section("Nothing was done yet"))
     return write_report(folder, f"What was found of {name}", command, sections)
+
+
+def report_with_modes(
+    folder: Path,
+    command: str,
+    rig: Rig,
+    found: Found,
+    train: Sequence[Recording],
+    choice: ModeChoice | None,
+    say: Callable[[str], None],
+) -> Path:
+    """The same with the modes of a choice, made anew: they do not travel between processes."""
+    hybrid = modes_of(rig, train, choice) if choice else None
+    return report(folder, command, rig.name, replace(found, hybrid=hybrid), say)

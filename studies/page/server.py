@@ -17,6 +17,7 @@ from bokeh.application import Application
 from bokeh.application.handlers.function import FunctionHandler
 from bokeh.core.validation import silence
 from bokeh.core.validation.warnings import EMPTY_LAYOUT
+from bokeh.document import Document
 from bokeh.resources import Resources
 from bokeh.server.server import BaseServer
 from bokeh.server.tornado import BokehTornado
@@ -122,6 +123,7 @@ class PageServer:
         """Serve until it is interrupted."""
         self._server.start()
         self._server.io_loop.add_callback(ready)
+        self._server.io_loop.add_callback(Page, Document(), all_tabs)  # imports what a page needs
         try:
             self._server.io_loop.start()
         except KeyboardInterrupt:

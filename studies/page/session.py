@@ -21,6 +21,7 @@ from workbench.rig_writing import rig_text
 
 if TYPE_CHECKING:
     from studies.page.control_tasks import Linearised, Looped
+    from studies.page.offers import Offers
     from studies.page.plausibility import Finding
     from studies.page.tasks import Accepted, Compared, Diagnosed, Opened
 
@@ -58,7 +59,7 @@ class Session:
 
     ``steps`` begin with the rig as it was opened, one more for each accepted effect or fit;
     ``checked`` is what the gate found, None before; ``offered`` are the effects that the last
-    diagnosis put in front.
+    diagnosis put in front; ``offers`` is what each method bears in each mode.
     """
 
     steps: tuple[Step, ...] = ()
@@ -69,6 +70,7 @@ class Session:
     offered: tuple[str, ...] = ()
     linearised: Linearised | None = None
     linearised_before: Linearised | None = None
+    offers: Offers | None = None
     looped: Looped | None = None
     reported: Path | None = None
     actions: tuple[Action, ...] = ()

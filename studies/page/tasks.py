@@ -27,7 +27,7 @@ from workbench.rig import Rig
 Say = Callable[[str], None]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Opened:
     """A recording as its file was read, and what was found of it."""
 
@@ -36,7 +36,7 @@ class Opened:
     findings: tuple[Finding, ...]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Compared:
     """A comparison, and for each of its recordings what it is looked at against.
 
@@ -49,20 +49,24 @@ class Compared:
     regimes: tuple[Regimes, ...] = field(repr=False)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Diagnosed:
-    """A diagnosis without its fits; ``text`` is what the command line prints."""
+    """A diagnosis without its fits; ``text`` is what the command line prints.
+
+    ``terms`` hold the missing term of every balance by its name, the worst first.
+    """
 
     verdict: Verdict
     sentence: str
     ranking: tuple[Ranked, ...] = field(repr=False)
     where: Where | None = field(repr=False)
+    terms: Mapping[str, Where] = field(repr=False)
     next_recording: NextRecording | None = field(repr=False)
     warnings: tuple[str, ...]
     text: str = field(repr=False)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Accepted:
     """A rig after one effect was added, or a fit, without its fits; see ``Addition``."""
 
@@ -113,12 +117,17 @@ def diagnose(
     """The verb; the ranking comes without its fits."""
     enough_samples(rig, train)
     found = workbench.diagnose(rig, train, validation, say)
+    from studies.page.balance_terms import terms_of
+
+    say("the missing term of every balance")
+    terms = terms_of(rig, found.base, found.where) if found.where else {}
     units = unit_names(rig.plant.measured + rig.plant.optional_outputs)
     return Diagnosed(
         found.verdict,
         found.sentence,
         tuple(replace(row, fit=None, validation=None) for row in found.ranking),
         found.where,
+        terms,
         found.next_recording,
         found.warnings,
         diagnosis_text(found, units),

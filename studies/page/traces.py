@@ -12,7 +12,7 @@ from studies.page.decimation import MOST_POINTS, peaks
 if TYPE_CHECKING:
     from bokeh.document import Document
 
-SETTLE_MS = 60  # from the last step of a zoom until the points of the new window are sent
+SETTLE_MS = 30  # from the last step of a zoom until the points of the new window are sent
 TIME, SAMPLE = "time", "sample"
 
 
@@ -23,7 +23,7 @@ class Traces:
         from bokeh.models import ColumnDataSource, Range1d
 
         self._document = document
-        self.source = ColumnDataSource(data={TIME: [], SAMPLE: []})
+        self.source = ColumnDataSource(data={TIME: [], SAMPLE: []}, name="traces")
         self.range = Range1d(0.0, 1.0)
         self.rows: dict[str, np.ndarray] = {TIME: np.zeros(0)}
         self.selected = np.zeros(0, dtype=bool)
@@ -61,8 +61,10 @@ class Traces:
         kept = self.source.data[SAMPLE]
         found = self._window(self.range.start, self.range.end)
         if not np.array_equal(kept, found[SAMPLE]):
+            self._document.hold("collect")  # points and what is lit of them are drawn once
             self.source.data = found
             self._light()
+            self._document.unhold()
 
     def select(self, within: np.ndarray) -> None:
         """Light up samples (n,) in every picture."""

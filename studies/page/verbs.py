@@ -33,6 +33,29 @@ def require_train(session: Session) -> None:
         raise InputError(Message("no recording is for training", expected="one in the first tab"))
 
 
+def require_used(session: Session) -> None:
+    """Refuse to go on without a recording.
+
+    Raises
+    ------
+    InputError
+        If there is none, or each is put aside.
+    """
+    if not session.used:
+        raise InputError(Message("no recording is open", expected="one in the first tab"))
+
+
+def require_rig(session: Session) -> None:
+    """Refuse to go on without a rig.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    _ = session.now
+
+
 def with_checked(session: Session, found: tuple[Finding, ...]) -> Session:
     """What the gate found; it changes nothing, so it is no action."""
     return replace(session, checked=found)
@@ -151,6 +174,7 @@ def _about(session: Session, steps: tuple[Step, ...]) -> Session:
         diagnosed=None,
         linearised=None,
         linearised_before=None,
+        offers=None,
         looped=None,
     )
 

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 POLL_MS = 200
 SHOWN = 240  # letters of a line of Python
+BUSY = "something is running: wait for it, or cancel it"
 COPY = "navigator.clipboard.writeText(said.text)"
 
 Change = Callable[[Session], Session]
@@ -33,6 +34,9 @@ class Tab(Protocol):
     def build(self) -> Model:
         """Its widgets."""
 
+    def of(self, session: Session) -> tuple[Any, ...]:
+        """The parts of a session that it shows: where they are the same, so is what it shows."""
+
     def show(self, session: Session) -> None:
         """What it shows of a session."""
 
@@ -43,9 +47,10 @@ class Page:
     def __init__(self, document: Document, tabs: Callable[[Page], list[Tab]]) -> None:
         self.document, self.session = document, Session()
         self._tabs = tabs(self)
-        self._shown: dict[int, Session] = {}
+        self._shown: dict[int, tuple[Any, ...]] = {}
         self._job: Job | None = None
-        self._then: Callable[[Any], Change] | None = None
+        self._then: Callable[[Any], Change] = lambda _: lambda session: session
+        self._otherwise: Callable[[], None] = lambda: None
         self._polling: Any = None
         self._replay = Path(f"workbench_replay_{strftime('%Y%m%d_%H%M%S')}_{id(self) % 9973}.py")
         self._build()
@@ -106,7 +111,7 @@ class Page:
     def attempt(self, change: Change) -> bool:
         """Another session, or what stands against it in words."""
         if self._job is not None:
-            self.complain("something is running: wait for it, or cancel it")
+            self.complain(BUSY)
             return False
         try:
             self.become(change(self.session))
@@ -116,24 +121,40 @@ class Page:
         self.calm()
         return True
 
+    def allows(self, needs: Callable[[Session], object]) -> bool:
+        """True where nothing runs and the session has what an action needs; else says why not."""
+
+        def same(session: Session) -> Session:
+            needs(session)
+            return session
+
+        return self.attempt(same)
+
     def work(
         self,
         action: Action,
         then: Callable[[Any], Change],
         task: Callable[..., Any],
         *arguments: Any,
+        otherwise: Callable[[], None] = lambda: None,
     ) -> None:
-        """Start a job for an action; ``then`` makes a change of the session from its result."""
+        """Start a job for an action.
+
+        ``then`` makes a change of the session from its result; ``otherwise`` is called where it
+        has none, as after a cancel.
+        """
         if self._job is not None:
-            self.complain("something is running: wait for it, or cancel it")
+            self.complain(BUSY)
             return
         if action.command:
             self.tell(action)
-        self.follow(Job(task, *arguments), then)
+        self.follow(Job(task, *arguments), then, otherwise)
 
-    def follow(self, job: Job, then: Callable[[Any], Change]) -> None:
+    def follow(
+        self, job: Job, then: Callable[[Any], Change], otherwise: Callable[[], None] = lambda: None
+    ) -> None:
         """Show a job while it runs."""
-        self._job, self._then = job, then
+        self._job, self._then, self._otherwise = job, then, otherwise
         self._cancel.visible = True
         self._polling = self.document.add_periodic_callback(self._poll, POLL_MS)
         self._poll()
@@ -152,8 +173,9 @@ class Page:
         then, self._job = self._then, None
         self._stop_polling()
         if told.refused:
+            self._otherwise()
             self.complain(told.refused)
-        elif then is not None and self.attempt(then(told.result)) and told.warned:
+        elif self.attempt(then(told.result)) and told.warned:
             said = "\n".join(dict.fromkeys(told.warned))
             self._status.text = f'<p class="warned" role="status">{escape(said)}</p>'
 
@@ -194,7 +216,7 @@ class Page:
         put(self._done, said + python + (kept if self._replay.exists() else ""))
 
     def refresh(self) -> None:
-        """Show the chosen tab, where the session is another one than it shows."""
+        """Show the chosen tab, where it shows other parts of a session than there are now."""
         rig = f": {escape(self.session.now.rig.name)}" if self.session.steps else ""
         put(self._head, f"<h1>workbench{rig}</h1>")
         active = self._choice.active or 0
@@ -202,9 +224,11 @@ class Page:
             panel.visible = k == active
         if not self._panels[active].children:
             self._panels[active].children = [self._tabs[active].build()]
-        if self._shown.get(active) is not self.session:
-            self._shown[active] = self.session
-            self._tabs[active].show(self.session)
+        tab = self._tabs[active]
+        before, now = self._shown.get(active), tab.of(self.session)
+        if before is None or any(one is not other for one, other in zip(before, now, strict=True)):
+            self._shown[active] = now
+            tab.show(self.session)
 
 
 def _short(line: str) -> str:

@@ -276,4 +276,5 @@ STUDY = Study(
     source="paper 002 Fig. 16; physics.md 5, worth adding",
     run=run,
     rows=("S002-8",),
+    plants=("servo_drive",),
 )

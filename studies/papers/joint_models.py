@@ -223,4 +223,6 @@ STUDY = Study(
     source="paper 000 Figs. 14, 16, 18; paper 001 Figs. 10, 11",
     run=run,
     rows=("S000-7", "S000-8", "S000-9", "S001-4", "S001-5"),
+    plants=("crr_arm",),
+    seeds="of the joints 7, of the noise the number of the joint",
 )

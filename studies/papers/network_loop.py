@@ -229,7 +229,7 @@ def _figure(loops: Mapping[str, Loop], reference: np.ndarray):
     shown = (
         ("1 ms each way", BLUE, "-"),
         ("redraw 1 Hz", GREEN, "--"),
-        ("redraw 10 Hz", RED, "-"),
+        ("redraw 10 Hz", RED, "-."),
     )
     lines = [Line(time_s, reference, "reference", ":", BLACK)]
     lines += [Line(time_s, loops[n].angle, n, style, colour) for n, colour, style in shown]
@@ -268,4 +268,5 @@ STUDY = Study(
     source="paper 001 Figs. 12 to 14",
     run=run,
     rows=("S001-6", "S001-7"),
+    plants=("crr_arm",),
 )

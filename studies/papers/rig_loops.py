@@ -215,7 +215,7 @@ def _sine_figure(tracked: Mapping[float, tuple[Recording, np.ndarray]]):
         x_range=(0.0, 3.2),
         y_range=(0.0, 35.0),
     )
-    panel = Panel("part of the period", "position (mm)", left)
+    panel = Panel("part of the period (-)", "position (mm)", left)
     return panels_figure([[panel, right]], PAGE_IN, 2.8, legend_columns=5)
 
 
@@ -241,4 +241,6 @@ STUDY = Study(
     source="paper 000 Figs. 12, 13, 15, 17; paper 001 Fig. 8",
     run=run,
     rows=("S000-5", "S000-6", "S000-8", "S000-9", "S001-3"),
+    plants=("crr_rig",),
+    seeds="of the rigs 1, of the full extent 1 to 5",
 )

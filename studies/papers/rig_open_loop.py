@@ -256,4 +256,6 @@ STUDY = Study(
     source="paper 000 Figs. 9 to 11; paper 001 Figs. 6, 7",
     run=run,
     rows=("S000-3", "S000-4", "S001-2"),
+    plants=("crr_rig",),
+    seeds="of the rigs 1, of the full extent 1 to 5",
 )

@@ -211,4 +211,6 @@ STUDY = Study(
     source="paper 000 Figs. 5, 7, 8; paper 001, valve",
     run=run,
     rows=("S000-1", "S000-2", "S001-1"),
+    plants=("crr_rig",),
+    seeds="of the rigs 1, of the full extent 1 to 5",
 )

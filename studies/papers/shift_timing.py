@@ -51,6 +51,7 @@ PRINTED = {
 """Table I in percent: p1, p2, x."""
 FINE_S, TICK_S, LENGTH_S, RELEASE_S = 1e-4, 1e-3, 0.08, 0.2
 THERE_M, MOVED_M, RISE = 0.3e-3, 0.1e-3, 1.02
+PRESSURE_LOOKS = (("p1", BLUE, ":", "-"), ("p2", RED, "-.", "--"))
 SEEDS = {Extent.QUICK: range(1, 6), Extent.FULL: range(1, 21)}
 SMALL_M = 0.15e-3
 
@@ -275,13 +276,13 @@ def _figure(models: Mapping[str, Shift], drawn: Mapping[str, list[Shift]]):
         places.append(Line(1e3 * ours.time_s, 1e3 * ours.seen[2], "model", "-", BLACK))
         rows[0].append(Panel("time (ms)", "position (mm)", places, name, x_range=span))
         lines = []
-        for k, (label, colour) in enumerate((("p1", BLUE), ("p2", RED))):
+        for k, (label, colour, of_rigs, of_model) in enumerate(PRESSURE_LOOKS):
             lines += [
-                Line(1e3 * r.time_s, 1e-5 * r.seen[k], f"{label}, rigs", ":", colour, 0.7)
+                Line(1e3 * r.time_s, 1e-5 * r.seen[k], f"{label}, rigs", of_rigs, colour, 0.6)
                 for r in real
             ]
             lines.append(
-                Line(1e3 * ours.time_s, 1e-5 * ours.seen[k], f"{label}, model", "-", colour)
+                Line(1e3 * ours.time_s, 1e-5 * ours.seen[k], f"{label}, model", of_model, colour)
             )
         rows[1].append(Panel("time (ms)", "pressure (bar)", lines, x_range=span))
     return panels_figure(rows, PAGE_IN, 4.0, legend_columns=6)
@@ -293,4 +294,6 @@ STUDY = Study(
     source="paper 003 Figs. 2, 3 and Table I",
     run=run,
     rows=("S003-1", "S003-2"),
+    plants=("gearbox",),
+    seeds="of the actuators 1 to 5, of the full extent 1 to 20",
 )

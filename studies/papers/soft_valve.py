@@ -244,7 +244,7 @@ def _figure(corners: list[Corner]):
     left = Panel("command (%)", "area (%)", lines_left)
     share = np.array([each.share for each in corners])
     right = Panel(
-        "corner, of the command's range",
+        "corner, share of the command's range (-)",
         "rise at the neutral command (psi/s)",
         [
             Line(share, np.array([each.creep_pa_s for each in corners]) / PSI_PA, "", "-", ORANGE),
@@ -262,4 +262,6 @@ STUDY = Study(
     source="paper 004 Figs. 5, 6",
     run=run,
     rows=("S004-1", "S004-2"),
+    plants=("soft_joint",),
+    seeds="of the currents 1",
 )

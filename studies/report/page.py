@@ -106,6 +106,7 @@ def _drawn(folder: Path, name: str) -> dict[str, str]:
 def inline(svg: str, name: str) -> str:
     """The SVG element alone, with names of its own: a page holds several."""
     bare = re.sub(r"<metadata>.*?</metadata>", "", svg[svg.index("<svg") :], flags=re.DOTALL)
+    name = name.replace("/", "-")
     own = re.sub(r'\bid="', f'id="{name}-', bare)
     own = re.sub(r'href="#', f'href="#{name}-', own)
     return re.sub(r"url\(#", f"url(#{name}-", own)

@@ -24,8 +24,10 @@ from scipy.optimize import least_squares
 
 from studies.demo import DATA, MOST_WINDOWS
 from workbench.diagnosis.diagnose import diagnose
+from workbench.diagnosis.refit import refit
 from workbench.diagnosis.result import DecidedBy
-from workbench.diagnosis.rough import windows_for
+from workbench.diagnosis.rough import rough_fit, windows_for
+from workbench.diagnosis.scan import scan
 from workbench.fitting.linearised import plant_at
 from workbench.fitting.problem import pose
 from workbench.reading import read_recording
@@ -124,6 +126,13 @@ def refitted_by_scipy(problem, candidate):
     return took_s, evaluated, unknowns.values(found.x[:n])[candidate.strength]
 
 
+def refitted_by_us(problem, candidate):
+    """The strength with the weights that scipy was given."""
+    base = problem.base
+    (profile,) = scan(problem.whole, base.windows, base.unknowns, base.point, [candidate])
+    return refit(problem, rough_fit(problem, profile)).size[candidate.strength].value
+
+
 @pytest.mark.slow
 def test_a_diagnosis_is_thirty_times_faster_than_refits_of_all_candidates_by_scipy():
     rig, train, validation = recorded(10.0)
@@ -137,15 +146,14 @@ def test_a_diagnosis_is_thirty_times_faster_than_refits_of_all_candidates_by_sci
         print(f"\nscipy, {name}: {took_s[name]:.0f} s, {evaluated} evaluations", end="")
     all_s = float(np.mean([*took_s.values()])) * len(asked(found))
     ratio = all_s / marks["end"][0]
-    leader = found.ranking[0]
-    own = leader.size[leader.candidate.strength].value
+    own = refitted_by_us(problem, problem.whole.candidates[HIDDEN])
     print(
         f"\nours, everything: {marks['end'][0]:.1f} s; scipy, {len(asked(found))} candidates: "
         f"{all_s:.0f} s by three of them, {ratio:.0f} times as long; "
         f"{HIDDEN} {own:.4g} and {strength[HIDDEN]:.4g}"
     )
 
-    assert leader.candidate.name == HIDDEN
+    assert found.ranking[0].candidate.name == HIDDEN
     assert strength[HIDDEN] == pytest.approx(own, rel=0.05)
     assert ratio > LEAST_RATIO
 

@@ -25,6 +25,13 @@ VISCOUS = "friction.viscous_n_s_m"
 PRESSURE_NOISE_PA, DRIVE_NOISE = 1e3, dict(zip(OUTPUTS, (5e-6, 500.0, 500.0), strict=True))
 TIMED, SETTLED = 300, 420
 ENGINES = ("machine code", "virtual machine")
+ASKED = {  # of a sample, by the issue
+    ("time constant", "machine code"): "median below 0.1 ms",
+    ("time constant", "virtual machine"): "p99 below 2.5 ms",
+    ("servo drive", "machine code"): "median below 0.6 ms",
+    ("servo drive", "virtual machine"): "3 ms",
+}
+TIMES = {by_do_mpc: 50, by_slsqp: 20}  # by which ours is to be faster
 
 
 @pytest.fixture(params=ENGINES)
@@ -119,8 +126,10 @@ def test_a_sample_of_a_moving_horizon(benchmark, engine, case):
     took_ms, lost = benchmark.pedantic(each_ms, args=(estimator, u, y, first), rounds=1)
     if benchmark.enabled:
         median, late = np.median(took_ms), np.percentile(took_ms, 99)
-        print(f"\n{case}, {engine}: median {median:.3f} ms, p99 {late:.3f} ms of {TIMED} samples; "
-              f"the filter took over {lost:.0f} times")  # fmt: skip
+        print(
+            f"\n{case}, {engine}: median {median:.3f} ms, p99 {late:.3f} ms of {TIMED} samples "
+            f"(asked for: {ASKED[case, engine]}); the filter took over {lost:.0f} times"
+        )
 
     assert lost <= 0.02 * TIMED
 
@@ -161,7 +170,8 @@ def compare(benchmark, converged, estimate, rival, ours, u, y):
         took_ms, _ = each_ms(ours, u, y, len(y) // 2)
         ratio = np.median(took) / np.median(took_ms)
         print(f"\n{rival.__name__} {np.median(took):.2f} ms, ours {np.median(took_ms):.3f} ms: "
-              f"{ratio:.0f} times; {name} {found:.6g} and {own:.6g}")  # fmt: skip
+              f"{ratio:.0f} times (asked for: {TIMES[rival]}); "
+              f"{name} {found:.6g} and {own:.6g}")  # fmt: skip
 
     assert found == pytest.approx(estimate.notes[f"estimated {name}"], rel=2e-3)
     assert found == pytest.approx(own, rel=2e-3)

@@ -24,7 +24,7 @@ def test_floor_smallest_and_largest_of_all_rows(benchmark, rows):
 def test_thinning_ten_minutes(benchmark, rows):
     kept = benchmark(peaks, rows, 0, N)
 
-    assert len(kept) <= 2402
+    assert len(kept) <= 1202
 
 
 def test_brushing_ten_minutes(benchmark, rows):

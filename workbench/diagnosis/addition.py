@@ -16,6 +16,7 @@ from workbench.diagnosis.refit import refit
 from workbench.diagnosis.result import Diagnosis, Evidence, Law, told
 from workbench.diagnosis.rough import rough_fit
 from workbench.diagnosis.scan import scan, scan_catalogue
+from workbench.diagnosis.settle import settled
 from workbench.diagnosis.where import locate
 from workbench.fitting.errors import Errors, errors_of
 from workbench.fitting.gauss_newton import Fit
@@ -87,10 +88,12 @@ def add(
     profiles = scan(problem.whole, base.windows, base.unknowns, base.point, candidates)
     begun = rough_fit(problem, profiles[0]) if len(names) == 1 else pair_fit(problem, profiles)
     found = refit(problem, begun)
+    fit = settled(found.fit, found.candidate)
     before = errors_of(base, problem.base_validation)
     drops = (found.drop_train, found.drop_validation)
     evidence = weighed(evidence, problem.base_validation)
-    return addition(rig, before, found.candidate, found.fit, found.validation, drops, evidence)
+    unseen = problem.validated(fit)
+    return addition(rig, before, found.candidate, fit, unseen, drops, evidence)
 
 
 def _names_in(name: str) -> list[str]:

@@ -35,6 +35,7 @@ from workbench.diagnosis.refit import Refit, refit, refit_from, refit_shift
 from workbench.diagnosis.result import NAMING, Diagnosis, Law, Ranked, Where
 from workbench.diagnosis.rough import rough_fit
 from workbench.diagnosis.scan import Profile, scan_catalogue, scan_from_priors
+from workbench.diagnosis.settle import with_settled_sizes
 from workbench.diagnosis.shifts import Shift, shifts
 from workbench.diagnosis.verdict import far_above_noise, judged, sentence, unexplained, unsteady
 from workbench.diagnosis.where import acts_in, locate
@@ -110,6 +111,9 @@ def diagnose(
     law = _law(problem, ranking, profiles, where, progress)
     far = far_above_noise(problem.base_validation)
     verdict = judged(ranking, law, evidence.strong, far)
+    if verdict in NAMING or (ranking and ranking[0].accepted):
+        progress("sizes of what is named")
+        ranking = with_settled_sizes(problem, ranking)
     best = ranking[0] if verdict in NAMING else None
     if best and best.fit and not best.fit.converged:
         warnings += (f"the refit with {best.candidate.name} did not converge: its size may be off",)

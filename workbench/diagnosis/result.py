@@ -130,11 +130,12 @@ class Where:
     Attributes
     ----------
     by_balance
-        Log-likelihood gained by an unknown input in each balance, at prior parameters.
+        Log-likelihood gained by an unknown input in each balance, at prior parameters; 0 where
+        none is likelier.
     balance
         The one that gains most.
     term
-        Its missing term over the training recording, shape (n,), in SI, named by ``term_name``
+        Its missing term over the training recordings, shape (n,), in SI, named by ``term_name``
         with its unit, for example ``force_n``.
     term_deviation, time_s
         Its standard deviation and the sample times, shape (n,).

@@ -37,7 +37,7 @@ from workbench.fitting.problem import Problem
 from workbench.fitting.window_length import moves
 from workbench.plant import Plant
 from workbench.plant_filter import PlantFilter
-from workbench.recording import Recording
+from workbench.recording import Recording, joined
 from workbench.simulation import inputs
 
 GRID_S = 5e-3  # of the filter
@@ -49,10 +49,11 @@ INTO_GAS = (Balance.VALVE, Balance.FLOW, Balance.MASS, Balance.ENERGY, Balance.S
 def locate(problem: Problem, recordings: Sequence[Recording]) -> Where | None:
     """Log-likelihood gain of each balance, and the missing flow of the one that gains most.
 
-    None for a plant without states, or where no filter run stayed finite.
+    All recordings are followed one after the other.  None for a plant without states, or where no
+    filter run stayed finite.
     """
     plant, flows = with_missing_flows(problem.whole.lean())
-    windows, recording = problem.base.windows, recordings[0]
+    windows, recording = problem.base.windows, joined(recordings)
     astray = wandering(plant, windows)
     suspected = suspects(plant, flows, recording, astray) if flows else []
     if not suspected:
@@ -77,7 +78,7 @@ def locate(problem: Problem, recordings: Sequence[Recording]) -> Where | None:
     drivers = _drivers(plant, result, course.commands)
     return Where(
         balance=worst.balance,
-        by_balance={s.balance: max(by.values()) for s, by in gains.items()},
+        by_balance={s.balance: max(0.0, *by.values()) for s, by in gains.items()},
         term_name=worst.term,
         time_s=result.time_s,
         term=term,

@@ -86,8 +86,8 @@ class Identified:
 
         ``into`` is another rig that has parameters of the same names, such as the drive whose valve
         was measured on a tank.  A parameter that a rig fixes keeps its value.  A value beyond the
-        range of its parameter is taken at the end of the range.  A cause that the rig file removed
-        is back where its strength was identified.
+        range of its parameter is taken at the end of the range, and a note says so.  A cause that
+        the rig file removed is back where its strength was identified.
 
         Raises
         ------
@@ -104,6 +104,11 @@ class Identified:
         values = {
             e.name: min(max(e.value, known[e.name].lower), known[e.name].upper) for e in taken
         }
+        beyond = [
+            f"{public_name(e.name)} stands at the end of its range: identified was a value beyond"
+            for e in taken
+            if values[e.name] != e.value
+        ]
         deviations = {e.name: e.deviation for e in taken if isfinite(e.deviation)}
         strengths = {name: c.strength for name, c in rig.plant.candidates.items()}
         return replace(
@@ -111,7 +116,7 @@ class Identified:
             plant=rig.plant.with_values(values),
             removed=tuple(name for name in rig.removed if strengths[name] not in values),
             deviations={**rig.deviations, **deviations},
-            notes=_with_notes(rig.notes, *(self._earlier if into else ()), note),
+            notes=_with_notes(rig.notes, *(self._earlier if into else ()), *beyond, note),
         )
 
     @property

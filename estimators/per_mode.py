@@ -1,0 +1,121 @@
+"""An estimator of its own in every mode: all of them run side by side, that of the mode speaks.
+
+The mode is looked up where the usual estimate lay and under the command that held since, as a
+filter on the modes does: the word of an estimator for one mode does not keep it there.  Every
+estimator sees every sample, so that none has to be begun anew where its mode begins, and what it
+costs is the sum.  A choice is written as
+
+    ekf,kalman@slide,ukf@stick middle
+
+the usual estimator first, then others with a mode's name or some words of it as they stand there;
+where several fit, the last counts.
+
+Source: P. S. Maybeck, "Stochastic Models, Estimation, and Control", vol. 2, 1982, Sec. 10.8 (banks
+of filters); here the mode is known by its box and its guards, not by likelihoods.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimators.scheduled_kalman import ScheduledKalman
+from workbench.contracts import Estimate, Estimator
+from workbench.errors import Message, UnknownNameError
+from workbench.plant import Plant
+
+NEXT, AT = ",", "@"
+
+
+@dataclass(frozen=True, kw_only=True)
+class PerMode:
+    """See the module; the note ``speaks`` counts the estimators from the usual one, 0.
+
+    Attributes
+    ----------
+    finder
+        Whose modes they are.
+    inner
+        The estimators, the usual one first; the states that all of them have are estimated.
+    speaks
+        Which of them speaks in each mode of the finder.
+    """
+
+    finder: ScheduledKalman
+    inner: tuple[Estimator, ...]
+    speaks: tuple[int, ...]
+
+    @property
+    def sample_time_s(self) -> float:
+        """That of all of them."""
+        return self.finder.sample_time_s
+
+    @property
+    def plant(self) -> Plant:
+        """The plant of all of them."""
+        return self.finder.plant
+
+    @property
+    def measurement_noise(self) -> Mapping[str, float]:
+        """That of all of them."""
+        return self.finder.measurement_noise
+
+    def start(self, measurement: np.ndarray) -> Estimate:
+        return self._told(0, tuple(each.start(measurement) for each in self.inner))
+
+    def update(self, last: Estimate, command: np.ndarray, measurement: np.ndarray) -> Estimate:
+        now = tuple(
+            each.update(before, command, measurement)
+            for each, before in zip(self.inner, last.memory, strict=True)
+        )
+        x = last.memory[0].pick(self.finder.sampled.hybrid.model.states)
+        return self._told(self.speaks[self.finder.mode_at(x, command)], now)
+
+    def _told(self, k: int, every: tuple[Estimate, ...]) -> Estimate:
+        """The estimate of one, in the states that all have; all of them are its memory."""
+        names = tuple(n for n in every[0].names if all(n in other.names for other in every))
+        rows = [every[k].names.index(name) for name in names]
+        notes = {**every[k].notes, "speaks": float(k)}
+        covariance = every[k].covariance[np.ix_(rows, rows)]
+        return Estimate(names, every[k].state[rows], covariance, every, notes)
+
+
+def names_of(choice: str) -> tuple[str, ...]:
+    """The estimators that a choice names, the usual one first."""
+    return tuple(part.partition(AT)[0].strip() for part in choice.split(NEXT))
+
+
+def chosen_per_mode(
+    choice: str, finder: ScheduledKalman, make: Callable[[str], Estimator]
+) -> Estimator:
+    """The estimator of a choice; a plain one where only one is named.
+
+    Parameters
+    ----------
+    make
+        An estimator by its name.
+
+    Raises
+    ------
+    UnknownNameError
+        If no mode has the words of a choice, or a later estimator has none.
+    """
+    names, parts = names_of(choice), choice.split(NEXT)
+    if len(parts) == 1 and AT not in choice:
+        return make(names[0])
+    known = [mode.name for mode in finder.sampled.hybrid.modes]
+    different = tuple(dict.fromkeys(names))
+    speaks = np.zeros(len(known), dtype=int)
+    for name, part in zip(names[1:], parts[1:], strict=True):
+        words = part.partition(AT)[2].strip()
+        fits = [k for k, mode in enumerate(known) if f" {words} " in f" {mode} "]
+        if not words or not fits:
+            what = f"{part.strip()!r} is for no mode; they are {', '.join(known)}"
+            raise UnknownNameError(Message(what, expected=f"words of one, as {name}@{known[0]}"))
+        speaks[fits] = different.index(name)
+    if AT in parts[0]:
+        what = f"{parts[0].strip()!r} comes first, which is for all other modes"
+        raise UnknownNameError(Message(what, expected=f"{names[0]}{NEXT}{choice}"))
+    return PerMode(finder=finder, inner=tuple(map(make, different)), speaks=(*speaks.tolist(),))

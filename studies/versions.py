@@ -1,0 +1,45 @@
+"""Which code made a result: a hash of ours, and the versions of what it stands on."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Iterable
+from functools import cache
+from hashlib import sha256
+from importlib.metadata import version
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+BELOW = ("workbench", "linearize", "controllers", "estimators")
+STANDS_ON = (
+    "numpy", "scipy", "casadi", "control", "cvxpy", "daqp", "filterpy", "osqp", "matplotlib",
+)  # fmt: skip
+
+
+@cache
+def code_of_loops() -> str:
+    """A hash of the code that closes a loop; figures, page and reports are left out."""
+    return _hash([*ROOT.glob("studies/*.py"), *_python(BELOW)])
+
+
+@cache
+def code() -> str:
+    """A hash of all that decides a study, its figures and its text."""
+    return _hash([*_python((*BELOW, "studies")), *ROOT.glob("studies/**/*.json")])
+
+
+def versions() -> dict[str, str]:
+    """A hash of our code, and versions of Python and of the libraries that numbers come from."""
+    libraries = {name: version(name) for name in STANDS_ON}
+    return {"code": code()[:16], "python": platform.python_version()} | libraries
+
+
+def _python(packages: Iterable[str]) -> list[Path]:
+    return [file for package in packages for file in ROOT.glob(f"{package}/**/*.py")]
+
+
+def _hash(files: Iterable[Path]) -> str:
+    found = sha256()
+    for file in sorted(files):
+        found.update(file.relative_to(ROOT).as_posix().encode() + b"\0" + file.read_bytes())
+    return found.hexdigest()

@@ -1,0 +1,43 @@
+"""Tables: one source, as a terminal shows them, as CSV, and as LaTeX."""
+
+import csv
+
+from studies.tables import Table, noted_tables, write_tables
+from studies.text import columns
+
+HEAD = ("line", "asked & found", "share")
+ROWS = [("rise_time", "a, b", "5 %"), ("x^2", "$1 < 2", "12 %")]
+
+
+def test_a_table_of_a_text_is_written_as_csv_that_says_the_same(tmp_path):
+    with noted_tables() as noted:
+        columns(("left", "out"), [("1", "2")])
+        text = "before\n\n" + columns(HEAD, ROWS) + "\nbehind it\n\n" + columns(("a",), [("b",)])
+    names = write_tables(text, noted, tmp_path)
+
+    assert names == ["table_1", "table_2"]
+    with (tmp_path / "table_1.csv").open(newline="") as file:
+        assert [*map(tuple, csv.reader(file))] == [HEAD, *ROWS]
+    assert (tmp_path / "table_2.csv").read_text() == "a\nb\n"
+
+
+def test_latex_has_a_column_each_and_no_letter_that_it_would_take_for_a_command():
+    lines = Table(HEAD, tuple(ROWS)).latex.splitlines()
+
+    assert lines[1:5] == [
+        r"\begin{tabular}{llr}",
+        r"\toprule",
+        r"line & asked \& found & share \\",
+        r"\midrule",
+    ]
+    assert lines[5] == r"rise\_time & a, b & 5 \% \\"
+    assert lines[6] == r"x\textasciicircum{}2 & \$1 \textless{} 2 & 12 \% \\"
+    assert lines[7:] == [r"\bottomrule", r"\end{tabular}"]
+
+
+def test_nothing_is_noted_outside_and_the_innermost_gets_it():
+    columns(HEAD, ROWS)
+    with noted_tables() as outer, noted_tables() as inner:
+        columns(HEAD, ROWS)
+
+    assert (len(outer), len(inner)) == (0, 1)

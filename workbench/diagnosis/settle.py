@@ -1,0 +1,72 @@
+"""Named effects fitted once more, weighed by the errors that are left with them.
+
+A refit weighs errors as the model without its effect made them.  Its rivals must share these
+weights, or their drops could not be compared.  But where the effect was large, windows that show it
+best count least, and what the nominal parameters have moved to imitate it stays with them: sizes
+come out too small.  With weights of its own the fit goes on to where the effect has its size.  The
+drops stay those of the common weights.
+
+Source: diagnosis.md 1.4 (scales from the residuals of the model itself), repeated as in iteratively
+reweighted least squares (Holland and Welsch 1977).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from workbench.candidate import Candidate
+from workbench.diagnosis.refit import ITERATIONS, sizes
+from workbench.diagnosis.result import Ranked, Size
+from workbench.fitting.gauss_newton import Fit, fit_windows
+from workbench.fitting.problem import Problem
+
+ROUNDS = 4
+STEADY = 0.02  # of a size, by which the last round may still move it
+
+
+def with_settled_sizes(problem: Problem, ranking: tuple[Ranked, ...]) -> tuple[Ranked, ...]:
+    """The ranking with its leader and what is tied with it settled; the order stays."""
+    leader = ranking[0]
+    named = {leader.candidate.name, *leader.tied_with}
+    return tuple(
+        _settled_row(problem, row) if row.fit and row.candidate.name in named else row
+        for row in ranking
+    )
+
+
+def settled(fit: Fit, candidate: Candidate) -> Fit:
+    """A fit with a candidate, repeated with weights of its own errors until its sizes stay."""
+    names = _names(candidate)
+    before = sizes(fit, names)
+    for _ in range(ROUNDS):
+        windows = fit.windows.rescaled(fit.residual)
+        fit = fit_windows(windows, fit.unknowns, fit.point, ITERATIONS)
+        now = sizes(fit, names)
+        if _steady(before, now):
+            break
+        before = now
+    return fit
+
+
+def _settled_row(problem: Problem, row: Ranked) -> Ranked:
+    fit = settled(row.fit, row.candidate)
+    size = sizes(fit, tuple(row.size))
+    return replace(row, fit=fit, validation=problem.validated(fit), size=size)
+
+
+def _names(candidate: Candidate) -> tuple[str, ...]:
+    """Strengths and forms of an effect, or of both of a pair."""
+    return tuple(
+        name
+        for each in candidate.singles
+        for name in (each.strength, *each.forms, each.held)
+        if name
+    )
+
+
+def _steady(before: Mapping[str, Size], now: Mapping[str, Size]) -> bool:
+    return all(
+        abs(each.value - before[name].value) <= STEADY * abs(each.value)
+        for name, each in now.items()
+    )
