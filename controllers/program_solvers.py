@@ -3,7 +3,7 @@
 Both keep nothing from one program to the next, so that a step is the same whatever was solved
 before, and the word of neither is taken for granted: z must be finite and keep all rows.  DAQP is
 an active-set method and exact; OSQP a first-order one, here with tightened tolerances and polish.
-``tests/benchmarks/test_speed_of_mpc.py`` prints speed and error of both.
+``workbench study control-speed`` prints speed and error of both.
 
 Source: D. Arnstrom, A. Bemporad and D. Axehill, "A dual active-set solver for embedded quadratic
 programming using recursive LDL' updates", IEEE Trans. Automatic Control 67 (2022) 4362;

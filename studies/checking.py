@@ -172,6 +172,15 @@ def drawn_plant(rig: Rig, number: int) -> Plant:
     return drawn(rig, np.random.default_rng((0, number))) if number else rig.plant
 
 
+def apart(rig: Rig, plant: Plant, most: int = 3) -> str:
+    """What sets a drawn plant apart from its rig, in standard deviations, farthest first."""
+    values, own = plant.values, rig.plant.values
+    spread = {name: rig.standard_deviation(name) for name in values}
+    far = {n: (v - own[n]) / spread[n] for n, v in values.items() if spread[n] and v != own[n]}
+    farthest = sorted(far, key=lambda n: -abs(far[n]))[:most]
+    return ", ".join(f"{public_name(n)} {far[n]:+.1f} sd" for n in farthest)
+
+
 def drawn(rig: Rig, rng: np.random.Generator) -> Plant:
     """The plant with every uncertain parameter drawn anew, within its bounds."""
     plant, values = rig.plant, {}

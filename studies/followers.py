@@ -7,23 +7,25 @@ as in paper 001; its estimator does not know.  No design was tuned on these draw
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
 
 from controllers.design_file import design
-from studies.checking import drawn
+from studies.checking import apart, drawn
 from studies.following import BENCHES
 from studies.following_check import check_followed, tasks_of
 from studies.kept import Kept
 from studies.study import Claim
 from studies.text import columns, shown
 from studies.yardsticks import FIRST_SEED
+from workbench.contracts import Controller
 from workbench.errors import listed
 from workbench.plant import Plant
 from workbench.plants import PLANTS
 from workbench.rig import default_rig
-from workbench.units import public_name, suffix
+from workbench.units import suffix
 
 PAUSES = {"crr_leg": {"packet_pause.redraw_hz": 1.0}}
 """What every drawn plant of a kind has on top."""
@@ -55,7 +57,7 @@ def drawn_plant(plant: Plant, number: int) -> Plant:
 
 
 def _run(plant: Plant, method: str, number: int) -> dict[str, dict[str, list[float | None]]]:
-    made, truth = {method: design(method, plant).controller}, drawn_plant(plant, number)
+    made, truth = {method: _designed(plant.name, method)}, drawn_plant(plant, number)
     try:
         rows = check_followed(
             truth, made, ["ekf"], tasks_of(plant), believed=plant, seed=number
@@ -68,6 +70,12 @@ def _run(plant: Plant, method: str, number: int) -> dict[str, dict[str, list[flo
         }
         for row in rows
     }
+
+
+@cache
+def _designed(name: str, method: str) -> Controller:
+    """The design for all draws, which is the same."""
+    return design(method, PLANTS[name]()).controller
 
 
 def _finite(value: float) -> float | None:
@@ -142,11 +150,7 @@ def _words(figure: str) -> str:
 def _apart(name: str, number: int) -> str:
     """What sets a drawn plant apart, in standard deviations, farthest first."""
     rig = default_rig(PLANTS[name]())
-    values, own = drawn_plant(rig.plant, number).values, rig.plant.values
-    spread = {n: rig.standard_deviation(n) for n in values}
-    far = {n: (v - own[n]) / spread[n] for n, v in values.items() if spread[n] and v != own[n]}
-    farthest = sorted(far, key=lambda n: -abs(far[n]))[:3]
-    return ", ".join(f"{public_name(n)} {far[n]:+.1f} sd" for n in farthest)
+    return apart(rig, drawn_plant(rig.plant, number))
 
 
 HEAD = ("plant", "design", "scenario", "figure", "median", "95 %", "worst", "at most", "met by")

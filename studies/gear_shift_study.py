@@ -10,6 +10,7 @@ above LQ and LQ above PD; physics.md 7, case 4.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -17,9 +18,11 @@ import numpy as np
 from controllers.design_file import design
 from controllers.switched_feedback import averaged, switched_lq, switched_pd
 from linearize.standard import shift_modes
-from studies.checking import drawn, styled_figures
+from studies.checking import apart, drawn, styled_figures
+from studies.kept import Kept, Row
 from studies.shift_check import SHIFTS, Shift, ShiftCheck, check_shifts, shift_table
 from studies.study import Claim, Extent, Outcome, Study
+from studies.workers import chosen_workers
 from workbench.contracts import Controller
 from workbench.plant import Plant
 from workbench.plants.gearbox import gearbox
@@ -33,7 +36,7 @@ HYBRID, PD, LQ, SCHEDULED = "hybrid MPC", "PD", "LQ", "scheduled LQ"
 
 
 def run(folder: Path, extent: Extent, say: Callable[[str], None]) -> Outcome:
-    """All of it, anew at every call; nothing is kept in ``folder``."""
+    """All of it; draws are kept in ``folder``, and a second start goes on with the rest."""
     say("designs side by side")
     beside = check_shifts(gearbox(), designs(gearbox()), SHIFTS)
     supplies = {}
@@ -41,12 +44,13 @@ def run(folder: Path, extent: Extent, say: Callable[[str], None]) -> Outcome:
         say(f"supply of {1e-5 * supply_pa:g} bar")
         plant = gearbox().with_values({SUPPLY: supply_pa})
         supplies[supply_pa] = check_shifts(plant, {HYBRID: hybrid(plant)}, SHIFTS).rows
-    rows = [row for k in range(DRAWS[extent]) for row in _draw(k, say)]
+    rows, known = _drawn_rows(Kept(folder / "work" / "rows.jsonl"), DRAWS[extent], say)
     text = "\n\n".join(
         [
             shift_table(beside.rows),
             *(f"{1e-5 * p:g} bar\n{shift_table(found)}" for p, found in supplies.items()),
             f"{DRAWS[extent]} draws, missed by\n{_missed(rows)}",
+            told_known(known),
         ]
     )
     claims = (*_claims(beside.rows, supplies), *_claims_of_draws(rows))
@@ -81,13 +85,61 @@ def hybrid(plant: Plant) -> Controller:
     return design("hybrid-mpc", plant).controller
 
 
-def _draw(number: int, say: Callable[[str], None]) -> tuple[Shift, ...]:
-    say(f"draw {number + 1}")
-    plant = gearbox()
-    truth = drawn(default_rig(plant), np.random.default_rng(FIRST_SEED + number))
-    made = {f"{HYBRID} {number + 1}": hybrid(plant)}
-    made |= {f"{name} {number + 1}": found for name, found in rivals(plant).items()}
-    return check_shifts(truth, made, SHIFTS, believed=plant, seed=number).rows
+def _drawn_rows(
+    kept: Kept, number: int, say: Callable[[str], None]
+) -> tuple[list[Shift], list[Shift]]:
+    """Shifts of all designs on so many drawn plants, and the missed ones where these are known.
+
+    What is kept is not run again.
+    """
+    pieces = {f"draw {k + 1}": k for k in range(number)}
+    found = chosen_workers().keep(
+        kept, _draw, pieces, lambda done, of: say(f"{done} of {of} drawn plants")
+    )
+    shifts, known = ([Shift(**r) for each in found for r in each[k]] for k in ("shifts", "known"))
+    return shifts, known
+
+
+def _draw(number: int) -> Row:
+    """All four shifts of every design on the plant of a draw, which no design knows.
+
+    What hybrid MPC misses is done once more with a design and a filter that know the plant.
+    """
+    plant, own = gearbox(), f"{HYBRID} {number + 1}"
+    truth = _truth(number)
+    made = {f"{name} {number + 1}": found for name, found in _compared().items()}
+    rows = check_shifts(truth, made, SHIFTS, believed=plant, seed=number).rows
+    missed = [row.scenario for row in rows if row.design == own and not row.reached]
+    known = check_shifts(truth, {own: hybrid(truth)}, missed, seed=number).rows if missed else ()
+    return {"shifts": [vars(row) for row in rows], "known": [vars(row) for row in known]}
+
+
+def _truth(number: int) -> Plant:
+    """The plant of a draw, the same at every call."""
+    return drawn(default_rig(gearbox()), np.random.default_rng(FIRST_SEED + number))
+
+
+def told_known(known: Iterable[Shift]) -> str:
+    """Whether it is the knowledge of the plant that a missed shift lacks, and of which plants."""
+    known = list(known)
+    reached = sum(row.reached for row in known)
+    head = (
+        f"of the {len(known)} missed, made by a design and a filter that know the plant: {reached}"
+    )
+    rig, numbers = default_rig(gearbox()), dict.fromkeys(_number(row) for row in known)
+    lines = [f"draw {k}: {apart(rig, _truth(k - 1))}" for k in numbers]
+    return "\n".join([head, *lines])
+
+
+def _number(row: Shift) -> int:
+    """Of the draw of a row, from 1."""
+    return int(row.design.rpartition(" ")[2])
+
+
+@cache
+def _compared() -> dict[str, Controller]:
+    """Hybrid MPC and the designs that the follow-ups rank, made once for all draws."""
+    return {HYBRID: hybrid(gearbox()), **rivals(gearbox())}
 
 
 def _of(rows: Iterable[Shift], name: str) -> list[Shift]:

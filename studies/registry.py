@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from studies import (
+    control_speed_study,
     controllers_study,
     delay_study,
     estimators_study,
@@ -51,5 +52,6 @@ STUDIES: dict[str, Study] = {
         drive_details.STUDY,
         shift_timing.STUDY,
         soft_valve.STUDY,
+        control_speed_study.STUDY,
     )
 }

@@ -13,6 +13,7 @@ from studies.gear_shift_study import (
     _claims_of_draws,
     _missed,
     ranking,
+    told_known,
 )
 from studies.shift_check import SHIFTS, Shift
 
@@ -67,3 +68,12 @@ def test_what_rivals_miss_is_no_miss_of_hybrid_mpc():
     )
     assert _missed(rows()) == "none"
     assert "hybrid MPC 2" in _missed(rows(**{HYBRID: 0.03}))
+
+
+def test_missed_shifts_are_told_with_what_sets_their_plants_apart():
+    late = [shift(f"{HYBRID} 5", "n-h", 0.03), shift(f"{HYBRID} 9", "l-n", 0.02)]
+    told = told_known(late).splitlines()
+
+    assert told[0].endswith("of the 2 missed, made by a design and a filter that know the plant: 1")
+    assert told[1].startswith("draw 5: ") and told[1].count(" sd") == 3
+    assert told[2].startswith("draw 9: ")
