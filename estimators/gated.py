@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import inf
 
 import numpy as np
 
@@ -56,7 +57,7 @@ class Gated(Wrapped):
         if "nis" not in before.notes:
             return None
         now = self.inner.update(before, command, measurement)
-        return now if now.notes["nis"] <= self.deviations**2 else None
+        return now if now.notes.get("nis", inf) <= self.deviations**2 else None
 
     @cached_property
     def _sight(self) -> Foresight:

@@ -140,7 +140,8 @@ class Horizon:
         """(tape, push) -> (tape, told): the first X and the noise of the linear problem.
 
         ``push`` is P^-1 times what bounds move the newest X by.  ``told`` is the cost before the
-        step, then d and P: the newest X less that of the path, without bounds, and its covariance.
+        step, then d and P: the newest X less that of the path, without bounds, and its covariance,
+        and ``nis``: the innovation squared over its covariance.
         """
         tape, push = self._symbols("tape", "push")
         solved, told = self._solved(self._parts(tape), push)
@@ -204,7 +205,7 @@ class Horizon:
         return ca.horzcat(mean, ca.densify(ca.diagcat(P[:free, :free], movement)))
 
     def _solved(self, now: Parts, push: ca.MX | float) -> tuple[Parts, tuple[ca.MX, ...]]:
-        """First X, noise and what is handed on, then (cost before, d, P) of the newest X."""
+        """First X, noise and what is handed on, then (cost before, d, P, nis) of the newest X."""
         M, points = self.nodes, now["points"]
         error = now["y"] - now["expected"]
         outputs = (error, now["received"], now["H"])
@@ -222,7 +223,8 @@ class Horizon:
         start = now["prior"][:, 0] + now["prior"][:, 1:] @ adjoints[:, -1]
         handed = ca.horzcat(points[:, 1] + ahead[:, 0], ahead[:, 1:width])
         later = dict(points=ca.horzcat(start, points[:, 1:]), noise=self._reversed(noise))
-        told = self._cost(now), newest[:, 0], newest[:, 1:]
+        nis = self.at.surprise(last, self._last(now["H"]))
+        told = self._cost(now), newest[:, 0], newest[:, 1:], nis
         return now | later | dict(handed=handed), told
 
     def _run(self, now: Parts, d: ca.MX, p: ca.MX) -> tuple[Parts, ca.MX]:

@@ -65,11 +65,12 @@ class Window:
 
 @dataclass(frozen=True)
 class Step:
-    """A step that was taken: the window behind it, its length, and whether bounds were active."""
+    """A step: the window behind it, its length, if bounds were active, and the sample's ``nis``."""
 
     window: Window
     length: float
     bounded: bool
+    nis: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,7 +144,7 @@ class MovingHorizon(StochasticPlant):
         late = perf_counter() - begun > self.deadline_s
         notes = {"fallback": float(failed or late), "late": float(late)}
         if not failed:
-            notes |= {"step": step.length, "bounded": float(step.bounded)}
+            notes |= {"step": step.length, "bounded": float(step.bounded), "nis": step.nis}
         if not (failed or late):
             return self._told(step.window, notes)
         memory = last.memory.X, last.memory.P
@@ -223,8 +224,8 @@ class MovingHorizon(StochasticPlant):
             return None
         if self.bounds and not ((self._limits[0] <= X) & (self._limits[1] >= X)).all():
             return None
-        P = self._square(told[1 + len(X) :])
-        return Step(Window(tape, X, P), 1.0, False) if sound(P) else None
+        P = self._square(told[1 + len(X) : -1])
+        return Step(Window(tape, X, P), 1.0, False, float(told[-1])) if sound(P) else None
 
     def _searched(self, tape: np.ndarray, full_failed: bool = False) -> Step:
         """The longest of the halved steps that lowers the cost, held inside the bounds.
@@ -239,7 +240,7 @@ class MovingHorizon(StochasticPlant):
         d, p = self._given
         functions, (lower, upper), n = self.functions, self._limits, len(self._names)
         aim, told = functions.solve(tape, np.zeros(n))
-        before, newest, P = told[0], told[1 : n + 1], self._square(told[n + 1 :])
+        before, newest, P = told[0], told[1 : n + 1], self._square(told[n + 1 : -1])
         if not (np.isfinite(told).all() and sound(P)):
             raise LostError("the linear problem is not finite, or its variances are below zero")
         at = functions.part(tape, "points")[:, -1]
@@ -255,7 +256,7 @@ class MovingHorizon(StochasticPlant):
             tried, after = functions.run(tape + length * (aim - tape), d, p)
             if after[0] <= allowed(before):
                 X = np.clip(functions.part(tried, "points")[:, -1], lower, upper)
-                return Step(Window(tried, X, P), length, bounded)
+                return Step(Window(tried, X, P), length, bounded, float(told[-1]))
         raise LostError("no step lowers the cost")
 
     @cached_property

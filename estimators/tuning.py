@@ -32,6 +32,7 @@ GROUPS = {"momentum": ("velocity_m_s", "velocity_rad_s"), "gas": ("pressure_pa",
 REST = "rest"
 SPANS = (100.0, 10.0, 3.0)  # factor to either side of a round's tries
 TRIES = 7
+STRETCH = 1000  # samples on which an estimator's own noise is searched
 
 
 @dataclass(frozen=True)
@@ -82,10 +83,18 @@ def suited(
     measured: np.ndarray,
     say: Callable[[str], None] = lambda message: None,
 ) -> Any:
-    """The estimator, with its :func:`own_noise` where it has left out a part of the plant."""
+    """The estimator, with its :func:`own_noise` where it has left out a part of the plant.
+
+    Of a longer recording the stretch counts in which the outputs move most.
+    """
     if not isinstance(estimator, ScheduledKalman | InteractingModels):
         return estimator
-    return estimator.retuned(own_noise(estimator, commands, measured, say).process_noise)
+    noise = np.array([estimator.measurement_noise[name] for name in estimator.plant.measured])
+    moved = np.nansum((np.diff(measured, axis=1) / noise[:, None]) ** 2, axis=0)
+    firsts = range(0, max(measured.shape[1] - STRETCH, 0) + 1, STRETCH // 2)
+    first = max(firsts, key=lambda k: moved[k : k + STRETCH].sum())
+    u, y = commands[:, first : first + STRETCH], measured[:, first : first + STRETCH]
+    return estimator.retuned(own_noise(estimator, u, y, say).process_noise)
 
 
 def own_noise(

@@ -202,6 +202,15 @@ class WindowNodes:
         return ca.Function("backward", [adjoint, gains, H, F, moved], results, {"cse": True})
 
     @cached_property
+    def surprise(self) -> ca.Function:
+        """(gains, H) -> innovation squared over its covariance, of all outputs of a node."""
+        gains, H = ca.SX.sym("gains", self.n + 2, self.n_y), ca.SX.sym("H", self.n_y, self.n)
+        nis = ca.SX(0.0)
+        for j in range(self.n_y):  # a gain K tells the variance: 1 - h K = 1 / variance
+            nis += gains[0, j] ** 2 / (1.0 - gains[1, j] * ca.dot(H[j, :].T, gains[2:, j]))
+        return ca.Function("surprise", [gains, H], [nis])
+
+    @cached_property
     def costs(self) -> ca.Function:
         """(error, received) -> what the errors of a node cost."""
         error, received = ca.SX.sym("error", self.n_y), ca.SX.sym("received", self.n_y)

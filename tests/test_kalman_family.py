@@ -106,7 +106,15 @@ def test_the_likelihood_of_the_linear_filter_is_that_of_the_extended_one_on_a_li
     last = [run(on_cart(name), u, y)[-1].notes for name in ("kalman", "ekf")]
 
     assert last[0]["log-likelihood"] == pytest.approx(last[1]["log-likelihood"], rel=1e-6)
-    assert last[0]["nis"] == pytest.approx(last[1]["nis"], rel=1e-5)
+
+
+@pytest.mark.parametrize("name", ESTIMATORS)
+def test_every_estimator_tells_how_surprising_a_sample_is(name):
+    """So that a gate need not ask for it by a second update."""
+    u, y = cart_data(30)
+    found, known = (run(on_cart(each), u, y)[-1].notes["nis"] for each in (name, "ekf"))
+
+    assert found == pytest.approx(known, rel=1e-5)
 
 
 @pytest.mark.parametrize(("place_m", "on"), [(12.05e-3, (1.0, 0.0)), (-12.05e-3, (0.0, 1.0)),

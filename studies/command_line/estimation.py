@@ -44,7 +44,8 @@ def estimate(
     """The estimators side by side on recordings, and on the rig's own plant under their inputs.
 
     Error of what is foretold at several horizons, consistency, time per sample; where the truth is
-    known, error of each state, with an effect hidden, and after holes.  The first 3 s count.
+    known, error of each state, with an effect hidden, and where data lack something: holes, slow
+    sensors, outliers, an output that is late.  The first 3 s count.
     """
     with answering(quiet) as say:
         from studies.estimating import USUAL, estimate_rig
