@@ -36,6 +36,11 @@ def chromium():
         found.close()
 
 
+def heard():
+    """Ctrl-C is heard also where these tests run in the background of a shell, which mutes it."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
 class Served:
     """A running page, and browser tabs on it."""
 
@@ -44,7 +49,7 @@ class Served:
         self.asked = []
         self.process = subprocess.Popen(
             [sys.executable, "-m", "studies.command_line", "app", *files],
-            cwd=folder, stdout=subprocess.PIPE, text=True,
+            cwd=folder, stdout=subprocess.PIPE, text=True, preexec_fn=heard,
             env={**os.environ, "PYTHONPATH": str(ROOT)},
         )  # fmt: skip
         self.address = self.process.stdout.readline().split()[-1]

@@ -36,7 +36,7 @@ class DesignTab:
         from bokeh.models import CheckboxButtonGroup, Select, Spinner, TextAreaInput
 
         self._method = Select(title="Controller", options=[], width=190, name="method")
-        self._method.on_change("value", lambda _a, _o, _n: self._chose())
+        self._method.on_change("value", lambda _a, old, new: self._chose(old, new))
         self._observers = CheckboxButtonGroup(labels=[], active=[0], stylesheets=[sheet(BUTTON)])
         self._scenario = Select(title="Scenario", options=[], width=150)
         self._scenario.on_change("value", lambda _a, _o, _n: self._judge())
@@ -97,9 +97,10 @@ class DesignTab:
         value = USUAL_METHOD if USUAL_METHOD in known else next(iter(known), "")
         self._method.update(options=known, value=value)
 
-    def _chose(self) -> None:
-        """By mode only where that is the controller."""
-        self._by_mode.open(self._method.value, self._observers.labels)
+    def _chose(self, old: str, new: str) -> None:
+        """By mode only where that is the controller; not while something else runs."""
+        if not self._by_mode.open(new, self._observers.labels):
+            self._method.value = old
 
     def _judge(self, typed: str | None = None) -> None:
         """The specification as it is typed against the loops that were run last."""
