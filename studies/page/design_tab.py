@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from studies.page.by_mode import ByMode
 from studies.page.control_verbs import design_action, with_looped
 from studies.page.drawn import as_html
-from studies.page.look import BUTTON, button, column, guide, put, row, sheet, text, wide
+from studies.page.look import BUTTON, button, column, guide, put, row, sharing, sheet, text, wide
 from studies.page.session import Session
 from studies.page.verbs import require_rig
 from workbench.errors import InputError
@@ -57,7 +57,7 @@ class DesignTab:
                   "see on the full nonlinear plant whether it meets what is asked."),
             row(self._method, observers, self._scenario, self._runs, check),
             self._by_mode.build(),
-            row(self._spec, self._verdict, top=True),
+            row(self._spec, sharing(self._verdict, 1, 400), top=True),
             self._loops,
             self._found,
             self._told,
@@ -157,7 +157,7 @@ class DesignTab:
 
 def _piece(told: str) -> str:
     """A table as it is, a sentence in as many lines as it needs."""
-    return wide(told) if "\n" in told else f'<p class="guide">{escape(told)}</p>'
+    return wide(told) if "\n" in told else f'<p class="guide piece">{escape(told)}</p>'
 
 
 def _run_of(design: str) -> int:

@@ -36,6 +36,7 @@ h1 {{ font-size: 18px; margin: 0; }}
 h2 {{ font-size: 15px; margin: 8px 0 2px; }}
 p {{ margin: 0; }}
 .guide {{ color: {SOFT}; max-width: 90ch; }}
+.piece {{ margin: 8px 0; }}
 .wrong {{ border-left: 4px solid {RED}; background: #fdf1ea; padding: 6px 10px;
           white-space: pre-wrap; overflow-wrap: anywhere; }}
 .warned {{ border-left: 4px solid {ORANGE}; background: #fdf6e3; padding: 6px 10px;
