@@ -21,6 +21,7 @@ FLAGS = [
     "--disable-sync",
 ]
 ROOT = Path(__file__).parent.parent
+LONG_MS = 900_000  # of a diagnosis on a busy machine
 NEEDED = pytest.mark.skipif(
     not Path(CHROMIUM).exists(), reason=f"no {CHROMIUM}: `apt-get install chromium`"
 )
@@ -57,7 +58,7 @@ class Served:
     def tab(self, width=1280, height=800, scale=1.0):
         size = {"width": round(width / scale), "height": round(height / scale)}
         found = self.browser.new_page(viewport=size, device_scale_factor=scale)
-        found.set_default_timeout(120_000)
+        found.set_default_timeout(LONG_MS)
         found.on("request", lambda request: self.asked.append(request.url))
         found.goto(self.address)
         return found
