@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from linearize.standard import POSITION
 from studies.closed_loop_check import Check
+from studies.figures.style import PAGE_IN, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -13,7 +14,7 @@ if TYPE_CHECKING:
 
     from workbench.closed_loop import LoopRecord
 
-LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1)), (0, (3, 1)))
+LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1)), (0, (3, 1)), (0, (1, 1)))
 A_STEP = 20.0  # an error beyond so many times the range of interest is the step itself
 
 
@@ -52,8 +53,6 @@ def draw_command(axes: Axes, records: dict[str, LoopRecord]) -> None:
 
 def check_figures(check: Check) -> dict[str, Figure]:
     """One figure per scenario, by file name without ending: position, error and command."""
-    from matplotlib.figure import Figure
-
     figures = {}
     for scenario in dict.fromkeys(row.scenario for row in check.rows):
         records = {
@@ -61,7 +60,7 @@ def check_figures(check: Check) -> dict[str, Figure]:
             for row, record in zip(check.rows, check.records, strict=True)
             if row.scenario == scenario
         }
-        figure = Figure(figsize=(7.16, 5.5), layout="constrained")
+        figure = new_figure(PAGE_IN, 5.5)
         position, error, command = figure.subplots(3, sharex=True)
         draw_position(position, records)
         draw_error(error, records)
@@ -73,13 +72,12 @@ def check_figures(check: Check) -> dict[str, Figure]:
 
 
 def _styles(records: dict[str, LoopRecord]) -> list[dict[str, str]]:
-    """One colour per design, one kind of line per estimator: the same in every panel."""
-    pairs = [name.rpartition(", ")[::2] for name in records]
-    designs, estimators = (list(dict.fromkeys(column)) for column in zip(*pairs, strict=True))
+    """One colour per design, and a kind of line of its own for each run, as a grey print asks."""
+    designs = list(dict.fromkeys(name.rpartition(", ")[0] for name in records))
     return [
         {
-            "color": f"C{designs.index(design)}",
-            "linestyle": LINES[estimators.index(estimator) % len(LINES)],
+            "color": f"C{designs.index(name.rpartition(', ')[0])}",
+            "linestyle": LINES[k % len(LINES)],
         }
-        for design, estimator in pairs
+        for k, name in enumerate(records)
     ]

@@ -111,7 +111,7 @@ def _claims(worse: Mapping[str, Mapping[str, float]]) -> Sequence[Claim]:
         return f"{number(worse[name][mark], 3)} times as large"
 
     needed = [
-        Claim(f"{name} worth modelling: {mark} without at least {CLEAR:g} times as large",
+        Claim(f"without {name}, {mark} is at least {CLEAR:g} times as large",
               told(name, mark), worse[name][mark] >= CLEAR)
         for name, mark in WORTH.items()
     ]  # fmt: skip

@@ -1,4 +1,4 @@
-"""The studies, by name.  A new one is one file and one line here."""
+"""The studies, by name, the longest first.  A new one is one file and one line here."""
 
 from __future__ import annotations
 
@@ -31,17 +31,17 @@ from studies.study import Study
 STUDIES: dict[str, Study] = {
     study.name: study
     for study in (
-        controllers_study.STUDY,
-        delay_study.STUDY,
-        gear_shift_study.STUDY,
-        estimators_study.STUDY,
-        fidelity_study.STUDY,
         hidden_study.STUDY,
-        identification_study.STUDY,
-        mode_count_study.STUDY,
-        mode_placement.STUDY,
+        estimators_study.STUDY,
         paper_004.STUDY,
+        controllers_study.STUDY,
+        identification_study.STUDY,
+        delay_study.STUDY,
+        mode_count_study.STUDY,
+        fidelity_study.STUDY,
         robustness_study.STUDY,
+        mode_placement.STUDY,
+        gear_shift_study.STUDY,
         shift_study.STUDY,
         rig_valve.STUDY,
         rig_open_loop.STUDY,

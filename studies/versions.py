@@ -6,7 +6,7 @@ import platform
 from collections.abc import Iterable
 from functools import cache
 from hashlib import sha256
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -29,16 +29,9 @@ def code() -> str:
 
 
 def versions() -> dict[str, str]:
-    """Versions of the workbench, of Python and of the libraries that numbers come from."""
-    found = {name: _version(name) for name in ("workbench", *STANDS_ON)}
-    return found | {"code": code()[:16], "python": platform.python_version()}
-
-
-def _version(name: str) -> str:
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return "not installed"
+    """A hash of our code, and versions of Python and of the libraries that numbers come from."""
+    libraries = {name: version(name) for name in STANDS_ON}
+    return {"code": code()[:16], "python": platform.python_version()} | libraries
 
 
 def _python(packages: Iterable[str]) -> list[Path]:

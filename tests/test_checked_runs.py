@@ -1,10 +1,12 @@
 """What a check over many drawn plants tells: lines, worst runs, influences, figures."""
 
+import csv
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from check_loops import MASS, RIG, SPEC, heavy_is_slow, metrics, record
+from commands import call
 
 from studies.checked_runs import FEW, check_rig
 from studies.checking import Loops, drawn_plant
@@ -54,18 +56,46 @@ def test_few_runs_are_told_one_by_one(lq, monkeypatch):
     assert [line.split()[:2] for line in told[1:]] == [["lq", str(k + 1)] for k in range(FEW)]
 
 
+def drawable(loops, plant, seed):
+    """As :func:`heavy_is_slow`, with what a figure draws."""
+    names = ("slide.position_m", "reference.slide.position_m", "valve.command_v")
+    channels = dict.fromkeys(names, np.linspace(0.1, 0.2, 3000))
+    pressure = record().recording["chamber_a.pressure_pa"]
+    channels["chamber_a.pressure_pa"] = np.resize(pressure, 3000)
+    rows = heavy_is_slow(loops, plant, seed).rows
+    return Check(rows, (SimpleNamespace(recording=Recording("run", 1e-3, channels)),))
+
+
+def test_a_check_writes_its_tables_and_a_report_with_parameters_and_seeds(
+    lq, monkeypatch, tmp_path
+):
+    monkeypatch.setattr(Loops, "once", drawable)
+    rig, spec, folder = (tmp_path / name for name in ("rig.toml", "spec.toml", "out"))
+    rig.write_text('plant = "servo_drive"\n[values]\n"slide.mass" = "3.21 kg"\n')
+    spec.write_text(SPEC)
+    answer = call(
+        "check", rig, lq, "--scenario", "step", "--spec", spec, "--runs", 15, "--workers", 1,
+        "--figures", folder,
+    )  # fmt: skip
+
+    with (folder / "tables" / "table_1.csv").open(newline="") as file:
+        head, *lines = csv.reader(file)
+    assert head[:3] == ["line", "asked", "median"] and len(lines) == 3
+    told = answer.stdout.splitlines()[1]  # the same words as on the terminal
+    assert all(word in told for word in lines[0])
+    assert r"\toprule" in (folder / "tables" / "table_1.tex").read_text()
+    page = (folder / "report.html").read_text()
+    assert page.count("<svg") == 3
+    for word in ("slide.mass", "3.21", "seed (0, k - 1)", np.__version__, "positioning"):
+        assert word in page
+
+
 def test_figures_close_the_first_and_the_worst_loops_again_and_no_others(lq, monkeypatch):
     again = []
 
     def noted(loops, plant, seed):
         again.append(seed)
-        n = 3000
-        names = ("slide.position_m", "reference.slide.position_m", "valve.command_v")
-        channels = dict.fromkeys(names, np.linspace(0.1, 0.2, n))
-        return Check(
-            heavy_is_slow(loops, plant, seed).rows,
-            (SimpleNamespace(recording=Recording("run", 1e-3, channels)),),
-        )
+        return drawable(loops, plant, seed)
 
     monkeypatch.setattr(Loops, "once", heavy_is_slow)
     asked = read_specification('rise_time = "150 ms"\n', RIG)

@@ -92,6 +92,15 @@ def test_what_parameters_imitate_is_looked_for_where_none_has_moved():
     assert size.value == pytest.approx(found.case.size, rel=0.10)
 
 
+@pytest.mark.slow
+def test_the_rivals_of_a_leader_are_asked_also_where_it_leads_from_another_s_place():
+    """Refitted from where friction along the stroke ended, an asymmetry leads: it has rivals."""
+    found = diagnosed_at("supply_restriction", 3)
+
+    assert found.diagnosis.verdict is Verdict.TIE, said([found])
+    assert found.right
+
+
 def droop(found):
     return next(r for r in found.diagnosis.ranking if r.candidate.name.startswith("supply_droop"))
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from figure_faults import faults
 
 from studies.papers import (
     drive_details,
@@ -111,6 +112,7 @@ def test_the_valve_of_the_soft_joint_keeps_its_claims(tmp_path):
     found = outcome(soft_valve.STUDY, tmp_path)
 
     assert not [claim for claim in found.claims if not claim.holds]
+    assert not [fault for figure in found.figures.values() for fault in faults(figure)]
     assert {each["row"] for each in found.numbers["findings"]} == set(soft_valve.STUDY.rows)
 
 
@@ -120,4 +122,5 @@ def test_the_studies_of_the_papers_keep_their_claims(module, tmp_path):
     found = outcome(module.STUDY, tmp_path)
 
     assert not [claim for claim in found.claims if not claim.holds]
+    assert not [fault for figure in found.figures.values() for fault in faults(figure)]
     assert set(module.STUDY.rows) <= {each["row"] for each in found.numbers["findings"]}

@@ -1,7 +1,9 @@
 """Studies: what is kept of long work, what the rows of the hidden-effect study say, the command."""
 
 import json
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
@@ -14,9 +16,12 @@ from studies.hidden_rows import Kind, Row, plain, row_again
 from studies.hidden_tasks import tasks
 from studies.kept import Kept
 from studies.registry import STUDIES
-from studies.running import run_study
+from studies.running import ALL, run_study
 from studies.study import Claim, Extent, Outcome, Study
 from workbench.rig import default_rig
+
+ROOT = Path(__file__).parent.parent
+MOST_BYTES = 120_000
 
 
 def row(hidden="coulomb_friction", first=None, place=1, own_drop=0.9, kind=Kind.EFFECT, **other):
@@ -235,3 +240,16 @@ def test_every_study_is_listed_with_its_question():
     for study in STUDIES.values():
         assert study.name in said
         assert study.question in said
+
+
+def test_the_gallery_shows_eight_small_figures_of_studies_that_there_are():
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    shown = re.findall(r"!\[[^]]+\]\((studies/gallery/[^)]+)\)", text)
+    named = set(re.findall(r"workbench study ([a-z0-9-]+)", text))
+
+    assert len(shown) == 8
+    assert {path.name for path in (ROOT / "studies" / "gallery").iterdir()} == {
+        Path(path).name for path in shown
+    }
+    assert all((ROOT / path).stat().st_size < MOST_BYTES for path in shown)
+    assert named <= {*STUDIES, ALL}

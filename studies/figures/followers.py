@@ -32,5 +32,5 @@ def follower_figure(shares: Mapping[str, Mapping[str, np.ndarray]]) -> Figure:
             axes.set_xlim(-0.6, len(found) - 0.4)
             axes.set_title(plant)
         panels[0][0].set_ylim(bottom=0.0)
-        panels[0][0].set_ylabel("found / asked at most")
+        panels[0][0].set_ylabel("found / asked at most (-)")
     return figure

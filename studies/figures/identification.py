@@ -49,8 +49,8 @@ def flow_figure(found: FlowFit) -> Figure:
         panels[0, 0].set_ylabel("reservoir pressure (bar)")
         rows = (
             (panels[1, 0], "area_m2", "effective area (mm²)", 1e6),
-            (panels[1, 1], "critical_ratio", "critical ratio b", 1.0),
-            (panels[2, 0], "subsonic_index", "subsonic index m", 1.0),
+            (panels[1, 1], "critical_ratio", "critical ratio b (-)", 1.0),
+            (panels[2, 0], "subsonic_index", "subsonic index m (-)", 1.0),
         )
         for axes, key, label, scale in rows:
             _over_command(axes, found, key, scale)

@@ -86,4 +86,4 @@ def _draw_map(axes: Axes, values: np.ndarray, rows: list[str], over: list[str]) 
         if np.isfinite(r):
             colour = "white" if abs(r) > DARK else BLACK
             axes.text(column, row, f"{r:+.2f}", ha="center", va="center", color=colour, fontsize=7)
-    axes.figure.colorbar(image, ax=axes, label="rank correlation")
+    axes.figure.colorbar(image, ax=axes, label="rank correlation (-)")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from linearize.shifting import POSITION
+from studies.figures.style import COLUMN_IN, new_figure
 from studies.shift_check import SETTLED_M, ShiftCheck
 from workbench.plants.gearbox import COMMANDS
 
@@ -14,11 +15,9 @@ if TYPE_CHECKING:
 
 def shift_figures(found: ShiftCheck) -> dict[str, Figure]:
     """One figure per shift, by file name without ending; the band is where a shift is settled."""
-    from matplotlib.figure import Figure
-
     figures = {}
     for scenario in dict.fromkeys(row.scenario for row in found.rows):
-        figure = Figure(figsize=(3.5, 3.2), layout="constrained")
+        figure = new_figure(COLUMN_IN, 3.2)
         place, *valves = figure.subplots(3, sharex=True, height_ratios=(4, 1, 1))
         pairs = zip(found.rows, found.records, strict=True)
         for k, (row, record) in enumerate(p for p in pairs if p[0].scenario == scenario):

@@ -55,6 +55,7 @@ WORTH_A_SHIFT = 0.25  # of the best refit
 LOCATED = 2  # candidates that are followed because they act where the smoother finds a lack
 IMITATED = 2  # candidates that are followed because they lead where no parameter has moved
 KEEPS = 0.75  # of its drop in training, held out: an effect that keeps less may be an imitation
+LEADERS = 2  # whose rivals are refitted from their places
 LEAVES_MUCH = 0.5  # of the misfit removed: below it, rivals are refitted from the leader's place
 
 Progress = Callable[[str], None]
@@ -170,7 +171,12 @@ def _followed(problem: Problem, where: Where | None, progress: Progress) -> _Fol
     for shift in [each for each in moved if each.leaves and each.drop > least][:SHIFTS_REFITTED]:
         progress(f"refit with {shift.name} free")
         refits.append(refit_shift(problem, shift, _best_share(refits)))
-    refits = _from_the_leader(problem, _best_first(problem, refits), profiles, progress)
+    refits = _best_first(problem, refits)
+    led = None
+    for _ in range(LEADERS):
+        if refits and refits[0].candidate != led:
+            led = refits[0].candidate
+            refits = _from_the_leader(problem, refits, profiles, progress)
     shares = {each.profile.candidate.name: each.share for each in begun}
     return _Followed(profiles, shares, refits, moved)
 
@@ -187,8 +193,8 @@ def _from_the_leader(
     """Refits with those of the leader's rivals that begin once more where it ended.
 
     Fits end in different valleys, and then the leader may lead by its place alone.  Rivals are
-    effects that do the same as an accepted leader, and where it leaves much all that were refitted;
-    shifts of fitted parameters begin at the base.
+    effects that do the same as an accepted leader, and where it leaves much all that were
+    refitted; shifts of fitted parameters begin at the base.
     """
     by_name = {profile.candidate.name: profile for profile in profiles}
     leader = refits[0] if refits else None

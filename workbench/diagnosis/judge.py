@@ -145,9 +145,9 @@ def tie_group(base: Fit, refits: list[Refit], profiles: dict[str, Profile]) -> l
     a signature in the same direction: then only the nuisances decide between the two, and on the
     held-out recording too, unless one leaves several times as much there.  Among the tied those
     that pass every criterion come first, effects before parameters that would lie far off what is
-    known of them, and among these the one leads that removes most of both recordings' misfit: the
-    two are equally good witnesses.  Those that look most like the leader stand next to it: were it
-    wrong, it would stand for one of them.
+    known of them, and among these the held-out recording decides where it does so clearly: the one
+    that leaves at least a fifth less of the misfit there leads.  Those that look most like the
+    leader stand next to it: were it wrong, it would stand for one of them.
     """
     best = refits[0]
     tied = [best]
@@ -164,7 +164,9 @@ def tie_group(base: Fit, refits: list[Refit], profiles: dict[str, Profile]) -> l
     sound = [each for each in tied if not reasons_against(base, each)] or tied[:LARGEST_TIE]
     tied = tied[: max(len(sound), LARGEST_TIE)]
     effects = [each for each in sound if each.candidate.name in profiles] or sound
-    leader = max(effects, key=share_removed)
+    best, leader = effects[0], min(effects, key=left_held_out)
+    if not left_held_out(leader) < (1.0 - CLEARLY_LESS) * left_held_out(best):
+        leader = best
     others = [each for each in tied if each is not leader]
     others.sort(key=lambda r: (r not in sound, -abs(_alignment_of(leader, r, profiles))))
     return [leader, *others]

@@ -1,0 +1,96 @@
+"""Figures are fit for a journal of two columns: width, units, fonts, and lines that grey keeps."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from check_loops import metrics
+from figure_faults import faults
+
+from studies.closed_loop_check import Check
+from studies.closed_loop_figures import check_figures
+from studies.figures.delays import delay_figure
+from studies.figures.fidelity import fidelity_figure
+from studies.figures.mode_count import mode_count_figure
+from studies.figures.panels import Line, Panel, panels_figure
+from studies.figures.robustness import influence_figure, spread_figure
+from studies.figures.style import save, styled
+from studies.robustness import Line as Asked
+from studies.robustness import Robustness
+from workbench.recording import Recording
+
+X = np.linspace(0.0, 1.0, 50)
+
+
+def closed_loops():
+    """Three designs with two estimators each, as a demo draws them."""
+    rows, records = [], []
+    for design in ("pid", "lq", "mpc"):
+        for estimator in ("ekf", "mhe"):
+            names = ("slide.position_m", "reference.slide.position_m", "valve.command_v")
+            recording = Recording("run", 1e-3, dict.fromkeys(names, X))
+            rows.append(metrics(design=design, estimator=estimator))
+            records.append(SimpleNamespace(recording=recording))
+    with styled():
+        return check_figures(Check(tuple(rows), tuple(records)))["closed_loop_step"]
+
+
+def robust(make):
+    rng = np.random.default_rng(3)
+    mass, noise = rng.standard_normal((2, 60))
+    lines = (
+        Asked("rise", "at most 3 ms", 2.0 + mass, mass > 1.0, "ms"),
+        Asked("error (mm)", "at most 2", noise**2, noise**2 > 2.0),
+    )
+    return make(Robustness(lines, {"slide.mass_kg": mass}))
+
+
+MARKS = ("RMSE (mm)", "overshoot (mm)")
+CURVES = {name: {mark: [1.0, 2.0, 3.0] for mark in MARKS} for name in ("lq", "pid")}
+FIGURES = {
+    "closed loops": closed_loops,
+    "spread": lambda: robust(lambda r: spread_figure(r, {"rise": 3.0, "error (mm)": 2.0})),
+    "influences": lambda: robust(influence_figure),
+    "delays": lambda: delay_figure([0, 1, 2], CURVES, {"lq": (1.0, 1.5), "pid": (np.nan, np.nan)}),
+    "fidelity": lambda: fidelity_figure({"friction": dict.fromkeys(MARKS, 2.0)}, MARKS),
+    "mode count": lambda: mode_count_figure([1, 2, 3], CURVES),
+}
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_a_figure_is_fit_for_a_journal(name):
+    assert not faults(FIGURES[name]())
+
+
+def curves(label="time (s)", width_in=7.16, **looks):
+    two = {"style": "-", "colour": "#0072B2"} | looks
+    lines = [Line(X, X, "one", "-", "#D55E00"), Line(X, -X, "two", **two)]
+    return panels_figure([[Panel(label, "place (mm)", lines)]], width_in, 3.0)
+
+
+@pytest.mark.parametrize(
+    ("figure", "fault"),
+    [
+        (curves(), "'one' and 'two' look alike in grey"),
+        (curves(label="time", style="--"), "no unit on 'time'"),
+        (curves(width_in=9.0, style="--"), "9.00 in wide"),
+    ],
+)
+def test_what_makes_a_figure_unfit_is_told(figure, fault):
+    assert faults(figure) == [fault]
+
+
+def test_black_and_a_light_colour_are_told_apart_without_another_line():
+    assert not faults(curves(colour="#F0E442"))
+
+
+def test_fonts_are_in_the_files_and_two_files_are_the_same(tmp_path):
+    for name in ("one", "two"):
+        save(curves(style="--"), tmp_path / name, "workbench check")
+    pdf, svg = ((tmp_path / f"one.{ending}").read_bytes() for ending in ("pdf", "svg"))
+
+    assert b"/FontFile2" in pdf and b"/Type3" not in pdf
+    assert b"<text" not in svg  # letters are drawn
+    for ending in ("pdf", "svg", "csv", "txt"):
+        one, two = (tmp_path / f"{name}.{ending}" for name in ("one", "two"))
+        assert one.read_bytes() == two.read_bytes()
