@@ -21,6 +21,7 @@ FLAGS = [
     "--disable-sync",
 ]
 ROOT = Path(__file__).parent.parent
+LONG_MS = 900_000  # of a diagnosis on a busy machine
 NEEDED = pytest.mark.skipif(
     not Path(CHROMIUM).exists(), reason=f"no {CHROMIUM}: `apt-get install chromium`"
 )
@@ -36,6 +37,11 @@ def chromium():
         found.close()
 
 
+def heard():
+    """Ctrl-C is heard also where these tests run in the background of a shell, which mutes it."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
 class Served:
     """A running page, and browser tabs on it."""
 
@@ -44,7 +50,7 @@ class Served:
         self.asked = []
         self.process = subprocess.Popen(
             [sys.executable, "-m", "studies.command_line", "app", *files],
-            cwd=folder, stdout=subprocess.PIPE, text=True,
+            cwd=folder, stdout=subprocess.PIPE, text=True, preexec_fn=heard,
             env={**os.environ, "PYTHONPATH": str(ROOT)},
         )  # fmt: skip
         self.address = self.process.stdout.readline().split()[-1]
@@ -52,7 +58,7 @@ class Served:
     def tab(self, width=1280, height=800, scale=1.0):
         size = {"width": round(width / scale), "height": round(height / scale)}
         found = self.browser.new_page(viewport=size, device_scale_factor=scale)
-        found.set_default_timeout(120_000)
+        found.set_default_timeout(LONG_MS)
         found.on("request", lambda request: self.asked.append(request.url))
         found.goto(self.address)
         return found

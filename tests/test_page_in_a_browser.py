@@ -12,8 +12,6 @@ from page_files import drive_files
 from studies.demo import DATA
 from workbench.rig import load_rig
 
-LONG_MS = 900_000  # of a diagnosis on a busy machine
-
 pytest.importorskip("bokeh", reason="the page needs bokeh (extra `page`)")
 pytestmark = NEEDED
 
@@ -119,7 +117,6 @@ def test_the_loop_on_the_demo_recording_from_files_to_a_saved_rig(served, tmp_pa
         shutil.copy(DATA / name, tmp_path)
     page_of = served(tmp_path, "rig.toml", "train.csv", "validation.csv")
     page = page_of.tab()
-    page.set_default_timeout(LONG_MS)
     page.wait_for_selector("text=Plausible?")
     click(page, "Check before a fit")
     page.wait_for_selector("text=uncertain parameters")

@@ -20,7 +20,7 @@ from workbench.filter_passes import recording_filter, smooth
 from workbench.fitting.gauss_newton import Fit
 from workbench.plant import Plant
 from workbench.plant_filter import PlantFilter
-from workbench.recording import Recording
+from workbench.recording import Recording, joined
 from workbench.rig import Rig
 
 
@@ -34,8 +34,8 @@ def terms_of(rig: Rig, base: Fit, worst: Where) -> dict[str, Where]:
     worst
         What the diagnosis found of the balance that gains most.
     """
-    recording = base.windows.recordings[0]
-    plant, flows = with_missing_flows(rig.fit_for(recording).lean())
+    recording = joined(base.windows.recordings)
+    plant, flows = with_missing_flows(rig.fit_for(base.windows.recordings[0]).lean())
     astray = wandering(plant, base.windows)
     noise = dict(zip(plant.measured, base.windows.noise, strict=True))
     step_s = float(worst.time_s[1] - worst.time_s[0])

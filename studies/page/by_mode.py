@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from studies.page.control_verbs import with_offers
 from studies.page.look import column, put, row, text
 from studies.page.replay import NO_ACTION
+from studies.page.verbs import require_rig
 from studies.text import number
 
 if TYPE_CHECKING:
@@ -42,18 +43,25 @@ class ByMode:
         self._whole.visible = False
         return self._whole
 
-    def open(self, method: str, observers: Sequence[str]) -> None:
-        """Ask what each method bears where the controller is the one by mode."""
+    def open(self, method: str, observers: Sequence[str]) -> bool:
+        """Ask what each method bears where the controller is the one by mode.
+
+        False where that cannot be asked now.
+        """
         from studies.page.offers import PER_MODE, mode_offers
 
         page, self._observers = self._page, tuple(observers)
+        asks = method == PER_MODE and page.session.offers is None
+        if asks and not page.allows(require_rig):
+            return False
         self._open = self._whole.visible = method == PER_MODE
-        if self._open and page.session.offers is None:
+        if asks:
             page.work(
                 NO_ACTION,
                 lambda found: lambda session: with_offers(session, found),
                 mode_offers, page.session.now.rig,
             )  # fmt: skip
+        return True
 
     def show(self, offers: Offers | None) -> None:
         """A line for each mode; the choices made so far stay."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from studies.page.by_mode import ByMode
 from studies.page.control_verbs import design_action, with_looped
 from studies.page.drawn import as_html
-from studies.page.look import BUTTON, button, column, guide, put, row, sheet, text, wide
+from studies.page.look import BUTTON, button, column, guide, put, row, sharing, sheet, text, wide
 from studies.page.session import Session
 from studies.page.verbs import require_rig
 from workbench.errors import InputError
@@ -36,7 +36,7 @@ class DesignTab:
         from bokeh.models import CheckboxButtonGroup, Select, Spinner, TextAreaInput
 
         self._method = Select(title="Controller", options=[], width=190, name="method")
-        self._method.on_change("value", lambda _a, _o, _n: self._chose())
+        self._method.on_change("value", lambda _a, old, new: self._chose(old, new))
         self._observers = CheckboxButtonGroup(labels=[], active=[0], stylesheets=[sheet(BUTTON)])
         self._scenario = Select(title="Scenario", options=[], width=150)
         self._scenario.on_change("value", lambda _a, _o, _n: self._judge())
@@ -57,7 +57,7 @@ class DesignTab:
                   "see on the full nonlinear plant whether it meets what is asked."),
             row(self._method, observers, self._scenario, self._runs, check),
             self._by_mode.build(),
-            row(self._spec, self._verdict, top=True),
+            row(self._spec, sharing(self._verdict, 1, 400), top=True),
             self._loops,
             self._found,
             self._told,
@@ -97,9 +97,10 @@ class DesignTab:
         value = USUAL_METHOD if USUAL_METHOD in known else next(iter(known), "")
         self._method.update(options=known, value=value)
 
-    def _chose(self) -> None:
-        """By mode only where that is the controller."""
-        self._by_mode.open(self._method.value, self._observers.labels)
+    def _chose(self, old: str, new: str) -> None:
+        """By mode only where that is the controller; not while something else runs."""
+        if not self._by_mode.open(new, self._observers.labels):
+            self._method.value = old
 
     def _judge(self, typed: str | None = None) -> None:
         """The specification as it is typed against the loops that were run last."""
@@ -156,7 +157,7 @@ class DesignTab:
 
 def _piece(told: str) -> str:
     """A table as it is, a sentence in as many lines as it needs."""
-    return wide(told) if "\n" in told else f'<p class="guide">{escape(told)}</p>'
+    return wide(told) if "\n" in told else f'<p class="guide piece">{escape(told)}</p>'
 
 
 def _run_of(design: str) -> int:

@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 from multiprocessing import forkserver
 from multiprocessing.connection import Connection
 from typing import Any
+from weakref import WeakSet
 
 from workbench.errors import InputError
 
@@ -49,6 +50,15 @@ class Told:
     refused: str = ""
 
 
+_UNDER_WAY: WeakSet[Job] = WeakSet()
+
+
+def end_all() -> None:
+    """Cancel whatever runs: the server ends."""
+    for job in list(_UNDER_WAY):
+        job.cancel()
+
+
 class Job:
     """A function of the module ``tasks`` at work; its last argument is a function for progress."""
 
@@ -61,6 +71,7 @@ class Job:
         sender.close()
         self._begun = time.monotonic()
         self.told = Told()
+        _UNDER_WAY.add(self)
 
     @property
     def elapsed_s(self) -> float:

@@ -36,6 +36,7 @@ h1 {{ font-size: 18px; margin: 0; }}
 h2 {{ font-size: 15px; margin: 8px 0 2px; }}
 p {{ margin: 0; }}
 .guide {{ color: {SOFT}; max-width: 90ch; }}
+.piece {{ margin: 8px 0; }}
 .wrong {{ border-left: 4px solid {RED}; background: #fdf1ea; padding: 6px 10px;
           white-space: pre-wrap; overflow-wrap: anywhere; }}
 .warned {{ border-left: 4px solid {ORANGE}; background: #fdf6e3; padding: 6px 10px;
@@ -50,6 +51,7 @@ th {{ text-align: left; font-weight: 600; border-bottom: 1px solid {INK};
 td {{ border-bottom: 1px solid {RULE}; padding: 2px 14px 2px 0; vertical-align: top; }}
 td.n, th.n {{ text-align: right; white-space: nowrap; }}
 td.k, th.k {{ white-space: nowrap; }}
+td.t {{ min-width: 180px; }}
 .wide {{ overflow-x: auto; max-width: calc(100vw - 48px); }}
 .wide:focus-visible {{ outline: 3px solid {ORANGE}; }}
 """
@@ -175,7 +177,7 @@ def html_table(
     """
 
     def cell(kind: str, k: int, word: str) -> str:
-        of = "n" if k >= numbers else "k" if k in names else ""
+        of = "n" if k >= numbers else "k" if k in names else "t"
         return f'<{kind} class="{of}">{escape(str(word))}</{kind}>'
 
     lines = ["".join(cell("th", k, word) for k, word in enumerate(head))]

@@ -8,6 +8,7 @@ is fetched from anywhere else.
 from __future__ import annotations
 
 import secrets
+import signal
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -28,7 +29,7 @@ from tornado.ioloop import IOLoop
 from tornado.web import RequestHandler
 
 from studies.page import tasks
-from studies.page.jobs import Job
+from studies.page.jobs import Job, end_all
 from studies.page.pages import all_tabs
 from studies.page.session import Session, with_opened, with_rig
 from studies.page.template import TEMPLATE
@@ -133,8 +134,7 @@ class PageServer:
 
     def close(self) -> None:
         """End what still runs."""
-        if self._reading:
-            self._reading.cancel()
+        end_all()
         self._server.stop()
 
     def _open(self, document: Any) -> None:
@@ -172,5 +172,6 @@ def _bound(port: int | None) -> tuple[list[Any], int]:
 def serve(rig: Path | None, recordings: Sequence[Path], port: int | None, show: Callable) -> None:
     """The page until it is interrupted; ``show`` gets its address once it answers."""
     silence(EMPTY_LAYOUT, True)  # tabs wait for results in empty columns
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # a kill ends it as Ctrl-C does
     server = PageServer(str(rig or ""), [*map(str, recordings)], port)
     server.run(lambda: show(server.address))
