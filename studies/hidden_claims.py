@@ -8,6 +8,7 @@ by one that is wrong.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from itertools import chain
 from math import ceil
 from statistics import median
@@ -15,7 +16,7 @@ from statistics import median
 from scipy.stats import binom
 
 from studies.figures.confusion import confusion_figure
-from studies.hidden_benches import BENCHES
+from studies.hidden_benches import BENCHES, SERVO_DRIVE
 from studies.hidden_rows import Kind, Row, counts, plain, table
 from studies.study import Claim, Extent, Outcome
 from workbench.diagnosis.result import Verdict
@@ -102,13 +103,22 @@ def _of_others(rows: Sequence[Row], enough: Enough) -> Iterator[Claim]:
         ("no false name where nothing is hidden", _right(of[Kind.NOTHING]), 1.0),
         ("effects of pairs found", accepted, 0.85),
         ("pairs without a wrong effect", [r.wrong == 0 for r in of[Kind.PAIR]], 1.0),
-        ("laws called outside the catalogue", _right(of[Kind.LAW]), 5 / 6),
         ("laws in the right balance", [r.balance_right for r in of[Kind.LAW]], 1.0),
         ("recordings called too weak", _right(of[Kind.WEAK]), 5 / 6),
         ("the same first name with priors three times as wide", same, 0.90),
     )
     for what, holds, least in asked:
         yield from _share(what, holds, least, enough)
+    yield from _laws(of[Kind.LAW], enough)
+
+
+def _laws(rows: Sequence[Row], enough: Enough) -> Iterator[Claim]:
+    """The bar for laws is for the six of the servo drive; the one of each other plant is told."""
+    others = [r.right for r in rows if r.plant != SERVO_DRIVE.plant]
+    told = f"; on other plants {sum(others)} of {len(others)}" if others else ""
+    six = [r.right for r in rows if r.plant == SERVO_DRIVE.plant]
+    for claim in _share("laws called outside the catalogue", six, 5 / 6, enough):
+        yield replace(claim, found=claim.found + told)
 
 
 def _is_there(row: Row) -> bool:

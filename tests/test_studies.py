@@ -148,6 +148,9 @@ def test_one_law_of_six_may_be_missed_but_not_its_balance():
     assert all(held(outcome([law] * 5 + [missed])).values())
     assert not held(outcome([law] * 4 + [missed] * 2))["laws called outside the catalogue"]
     assert not held(outcome([law] * 5 + [elsewhere]))["laws in the right balance"]
+    other = replace(missed, plant="crr_rig")
+    found = {c.claim.partition(",")[0]: c for c in outcome([law] * 6 + [other]).claims}
+    assert found["laws called outside the catalogue"].found.endswith("on other plants 0 of 1")
 
 
 def test_other_priors_are_held_against_the_answer_of_the_same_case():
