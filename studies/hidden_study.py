@@ -22,7 +22,7 @@ from studies.hidden_benches import BENCHES
 from studies.hidden_claims import outcome
 from studies.hidden_effects import Recorded
 from studies.hidden_rows import Kind, Row, plain, row_again
-from studies.hidden_tasks import Task, recorded, tasks
+from studies.hidden_tasks import SLOW, Task, recorded, tasks
 from studies.kept import Kept
 from studies.study import Extent, Outcome, Study
 
@@ -42,24 +42,34 @@ def finished(
 ) -> list[Row]:
     """A row for every task; what is kept in the folder is not asked again."""
     kept = Kept(folder / ANSWERS)
-    for plant in dict.fromkeys(task.plant for task in asked):
+    groups = []
+    for plant in sorted(dict.fromkeys(task.plant for task in asked), key=_slowest_first):
         there = [task for task in asked if task.plant == plant]
-        left = [task for task in there if task.key not in kept]
-        say(f"{plant}: {len(left)} of {len(there)} cases to answer")
-        for task, row in _answers(left, processes):
-            kept.add(task.key, plain(row))
-            right = "right" if row.right else "WRONG"
-            say(f"{plant} {row.hidden}:{row.seed} -> {row.first}, {row.verdict}, {right}")
+        groups.append([task for task in there if task.key not in kept])
+        say(f"{plant}: {len(groups[-1])} of {len(there)} cases to answer")
+    for task, row in _answers(groups, processes):
+        kept.add(task.key, plain(row))
+        right = "right" if row.right else "WRONG"
+        say(f"{task.plant} {row.hidden}:{row.seed} -> {row.first}, {row.verdict}, {right}")
     return [row_again(kept.rows[task.key]) for task in asked]
 
 
-def _answers(asked: Sequence[Task], processes: int) -> Iterator[tuple[Task, Row]]:
-    """Answers as they come."""
-    if not asked:
+def _slowest_first(plant: str) -> int:
+    """So that no core waits for the last long answer."""
+    return 0 if plant == SLOW else 1
+
+
+def _answers(groups: Sequence[Sequence[Task]], processes: int) -> Iterator[tuple[Task, Row]]:
+    """Answers as they come; the tasks of a group are those of one plant."""
+    if not any(groups):
         return
-    work = list(zip(asked, recorded(asked), strict=True))
-    with get_context("spawn").Pool(min(processes, len(work))) as several:
-        yield from several.imap_unordered(_answer, work)
+    with get_context("spawn").Pool(min(processes, sum(map(len, groups)))) as several:
+        yield from several.imap_unordered(_answer, _work(groups))
+
+
+def _work(groups: Sequence[Sequence[Task]]) -> Iterator[tuple[Task, Recorded]]:
+    for group in groups:
+        yield from zip(group, recorded(group) if group else (), strict=True)
 
 
 def _answer(work: tuple[Task, Recorded]) -> tuple[Task, Row]:
