@@ -1,10 +1,10 @@
 """Study ``hidden-effects`` at scale: many cases, kept as they are answered, and what they say.
 
 The full grid is everything: single effects, nothing, laws outside the catalogue, pairs, recordings
-too weak to tell, and other widths of the priors.  The quick one is a sample of one seed, without pairs and
-widths.  Two
-processes answer; each answer is kept on disk at once, so a second start goes on where a first one
-ended.  Visible is a hidden effect whose own refit removes more than 30 % of the misfit.
+too weak to tell, and other widths of the priors.  The quick one is a sample of one seed, without
+other widths.  Two processes answer; each answer is kept on disk at once, so a second start goes
+on where a first one ended.  Visible is a hidden effect whose own refit removes more than 30 % of
+the misfit.
 
 ``python -m studies.hidden_study --kind law --plant servo_drive`` answers a part of the full grid.
 

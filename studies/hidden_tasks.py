@@ -54,14 +54,14 @@ class Task:
 
 
 def tasks(extent: Extent) -> list[Task]:
-    """Everything that is stored, or a sample of one seed.
+    """Everything that is stored, or a sample of one seed, pairs first, which take longest.
 
-    Other widths and pairs, which take several diagnoses each, in full only.
+    Other widths in full only.
     """
     if extent is Extent.FULL:
         return [*_single(), *_pairs(), *_weak(), *_widths()]
     groups: dict[tuple[str, Kind], list[Task]] = {}
-    for task in (*_single(), *_weak()):
+    for task in (*_pairs(), *_single(), *_weak()):
         if task.seed == QUICK_SEED:
             groups.setdefault((task.plant, task.kind), []).append(task)
     sample = [task for group in groups.values() for task in group[::QUICK_EVERY]]
