@@ -4,7 +4,7 @@ import os
 import signal
 import subprocess
 import sys
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
@@ -98,4 +98,8 @@ def drag(page, x, y, far, lift=True):
 
 
 def no_wider_than_the_window(page):
-    return page.evaluate("document.documentElement.scrollWidth <= window.innerWidth + 1")
+    """False where something still sticks out when the page has had time to lay itself out."""
+    fits = "document.documentElement.scrollWidth <= window.innerWidth + 1"
+    with suppress(Exception):  # a timeout: what is asked then tells
+        page.wait_for_function(fits, timeout=20_000)
+    return page.evaluate(fits)

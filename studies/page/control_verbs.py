@@ -77,10 +77,12 @@ def with_looped(session: Session, found: Looped, action: Action) -> Session:
 
 
 def report_action(session: Session, folder: str) -> Action:
-    """The report of what the session holds."""
-    given = []
+    """The report of what the session holds; as commands, of the figures of what was compared."""
+    given, shown = [], []
     if session.compared:
         given.append("comparison=comparison")
+        recorded = paths(session.used)
+        shown.append(command("compare", session.now.rig_file, *recorded, "--figures", folder))
     if session.diagnosed:
         given.append("diagnosis=diagnosis")
     if len(session.steps) > 1:
@@ -89,7 +91,7 @@ def report_action(session: Session, folder: str) -> Action:
         given.append("hybrid=hybrid")
     if session.looped:
         given.append("check=looped.check")
-    words = command("report", folder)
+    words = "\n".join([*shown, command("report", folder)])
     lines = (
         "from pathlib import Path",
         "from studies.page.reporting import Found, report",
