@@ -35,6 +35,11 @@ class Candidate:
         return tuple(f"{self.member}.{key}" for key in self.cause.forms)
 
     @property
+    def moved(self) -> tuple[str, ...]:
+        """Full names of the parameters that adding it sets free: strength, forms, what it holds."""
+        return tuple(name for name in (self.strength, *self.forms, self.held) if name)
+
+    @property
     def held(self) -> str | None:
         """Full name of the fitted parameter that this cause shifts, if it shifts one."""
         return f"{self.member}.{self.cause.held}" if self.cause.held else None

@@ -224,15 +224,10 @@ def assembled(rig: Rig, steps: Sequence[Addition]) -> Rig:
     own: set[str] = set()
     found = rig
     for step in steps:
-        own.update(_names(step.candidate))
+        own.update(step.candidate.moved)
         found = freed(found, step, own)
     kept = [line for step in steps for line in step.rig.notes[-1:]]
     return replace(found, notes=(*rig.notes, *kept))
-
-
-def _names(candidate: Candidate) -> list[str]:
-    """Full names of the parameters that adding a candidate sets free."""
-    return [n for n in (candidate.strength, *candidate.forms, candidate.held) if n]
 
 
 def freed(rig: Rig, step: Addition, own: Iterable[str] | None = None) -> Rig:

@@ -37,7 +37,7 @@ def with_settled_sizes(problem: Problem, ranking: tuple[Ranked, ...]) -> tuple[R
 
 def settled(fit: Fit, candidate: Candidate) -> Fit:
     """A fit with a candidate, repeated with weights of its own errors until its sizes stay."""
-    names = _names(candidate)
+    names = tuple(name for each in candidate.singles for name in each.moved)
     before = sizes(fit, names)
     for _ in range(ROUNDS):
         windows = fit.windows.rescaled(fit.residual)
@@ -53,16 +53,6 @@ def _settled_row(problem: Problem, row: Ranked) -> Ranked:
     fit = settled(row.fit, row.candidate)
     size = sizes(fit, tuple(row.size))
     return replace(row, fit=fit, validation=problem.validated(fit), size=size)
-
-
-def _names(candidate: Candidate) -> tuple[str, ...]:
-    """Strengths and forms of an effect, or of both of a pair."""
-    return tuple(
-        name
-        for each in candidate.singles
-        for name in (each.strength, *each.forms, each.held)
-        if name
-    )
 
 
 def _steady(before: Mapping[str, Size], now: Mapping[str, Size]) -> bool:
