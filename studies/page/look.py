@@ -52,7 +52,8 @@ td {{ border-bottom: 1px solid {RULE}; padding: 2px 14px 2px 0; vertical-align: 
 td.n, th.n {{ text-align: right; white-space: nowrap; }}
 td.k, th.k {{ white-space: nowrap; }}
 td.t {{ min-width: 180px; }}
-.wide {{ overflow-x: auto; max-width: calc(100vw - 48px); }}
+.bk-clearfix {{ max-width: 100%; }}
+.wide {{ overflow-x: auto; max-width: 100%; }}
 .wide:focus-visible {{ outline: 3px solid {ORANGE}; }}
 """
 BUTTON = f"""
