@@ -42,6 +42,7 @@ def errors_table(each: RecordingComparison) -> str:
             if (error := found.get(name))
         ],
         numbers=2,
+        names=(0, 1),
     )  # fmt: skip
 
 
