@@ -7,6 +7,7 @@ from estimators.moving_horizon import MovingHorizon, sound
 from estimators.unscented_kalman import UnscentedKalman
 from workbench.plants.gearbox import COMMANDS, gearbox
 from workbench.plants.servo_drive import COMMAND, OUTPUTS, servo_drive
+from workbench.plants.vertical_cylinder import vertical_cylinder
 from workbench.polytropic import with_polytropic_gas
 from workbench.recording import Recording
 from workbench.simulation import simulate
@@ -48,6 +49,30 @@ def test_a_slide_that_hits_its_stop_is_followed(uncompiled):
     assert np.abs(truth["slide.velocity_m_s"]).max() > 1.0  # it arrives at full speed
     assert all(sound(e.memory.P) for e in found)
     assert np.std((velocity - truth["slide.velocity_m_s"])[20:]) < 0.05
+
+
+def test_a_step_that_misses_what_an_impact_did_gives_way_to_the_filter(uncompiled):
+    """With next to no process noise a path that went wrong at the stop would be believed."""
+    plant = vertical_cylinder().lean()
+    (pressure,) = plant.model.measured_inputs
+    u = 2.1e5 + 3e4 * np.sin(9e-3 * np.arange(160))
+    truth = simulate(plant, Recording("truth", 1e-3, {pressure: u}))
+    noise = dict.fromkeys(plant.measured, 2e-5)
+    estimator = MovingHorizon(
+        plant=plant.with_inputs_commanded(),
+        sample_time_s=1e-3,
+        measurement_noise=noise,
+        process_noise={"rod.velocity_m_s": 1e-3},
+        initial_deviation={"rod.position_m": 2e-5, "rod.velocity_m_s": 1e-2},
+    )
+
+    found = followed(estimator, truth, noise)
+    off = np.array([e.pick(plant.measured)[0] for e in found]) - truth[plant.measured[0]]
+    given_way = sum(e.notes["fallback"] for e in found)
+
+    assert np.ptp(np.sign(truth["rod.velocity_m_s"])) == 2.0  # it rebounds
+    assert np.abs(off).max() < 3 * 2e-5
+    assert 1 <= given_way < 5
 
 
 def test_points_of_the_unscented_filter_do_not_throw_armatures_against_their_stops(uncompiled):
