@@ -87,7 +87,8 @@ def consistency_claims(found: Mapping[str, Sequence[Mapping[str, Any]]]) -> Iter
         s = summary(rows)
         yield Claim(
             f"{name}: NEES over {s['runs']} runs inside its 95 % band",
-            f"{s['nees']:.2f} of {s['low']:.2f} to {s['high']:.2f}",
+            f"{s['nees']:.2f} of {s['low']:.2f} to {s['high']:.2f}; {percent(s['inside'])} of the "
+            "samples inside theirs",
             s["low"] <= s["nees"] <= s["high"],
         )
 
