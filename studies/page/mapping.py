@@ -12,6 +12,7 @@ from studies.page.look import button, column, row, text
 from studies.page.plausibility import column_names
 from studies.page.replay import NO_ACTION, Action
 from studies.page.session import TIME, Session, mapped, paths, with_opened, with_rig
+from studies.page.verbs import require_rig
 from workbench.errors import InputError, whole_file
 from workbench.recording_format import channel_names
 from workbench.units import display_unit
@@ -53,6 +54,8 @@ class Mapping:
         )
 
     def _fold(self) -> None:
+        if not self._inner.visible and not self._page.allows(require_rig):
+            return
         self._inner.visible = not self._inner.visible
         self._fill()
 

@@ -118,13 +118,23 @@ class ModesTab:
 
     def _move(self) -> None:
         """The modes with the boundaries where the sliders are; those under way are not wanted."""
+        from studies.page.control_tasks import linearise
         from studies.page.mode_cuts import moved
 
-        self._page.cancel()
+        page = self._page
         changes = [
             (each, display_scale(each.signal).to_si(slider.value)) for each, slider in self._sliders
         ]
-        self._cut(moved(dict(self._page.session.linearised.cuts), changes))
+        page.supersede(linearise)
+        if page.allows(require_rig):
+            self._cut(moved(dict(page.session.linearised.cuts), changes))
+        else:
+            self._back()
+
+    def _back(self) -> None:
+        """The sliders where the boundaries are."""
+        if self._page.session.linearised:
+            self._cuts.children = [*self._movable(self._page.session.linearised)]
 
     def _cut(self, cuts: dict[str, tuple[Interval, ...]]) -> None:
         from studies.page.control_tasks import ModeChoice
@@ -149,4 +159,5 @@ class ModesTab:
             lambda found: lambda now: with_linearised(now, found, action),
             linearise, session.now.rig,
             recordings(session.of(Role.TRAINING)), choice,
+            otherwise=self._back,
         )  # fmt: skip
