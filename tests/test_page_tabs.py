@@ -19,6 +19,7 @@ from studies.page.session import Role, Session, recordings, with_opened, with_ri
 from studies.page.verbs import with_compared
 from studies.page.view import Page
 from studies.specification import design_numbers, read_specification
+from workbench.errors import InputError
 from workbench.rig import default_rig
 
 
@@ -221,3 +222,41 @@ def test_an_effect_that_is_refused_or_cancelled_is_not_ticked(page, compared):
     tab._ticks.active = [0]
 
     assert tab._ticks.active == [] and "no recording is for training" in page._status.text
+
+
+def at_once(page):
+    """Jobs of a page done where it stands, as far as they go."""
+
+    def work(_action, then, task, *arguments, otherwise=quiet):
+        try:
+            found = task(*arguments, quiet)
+        except InputError as error:
+            page.complain(str(error))
+        else:
+            page.attempt(then(found))
+
+    return work
+
+
+def test_columns_in_a_wrong_unit_leave_the_rig_and_its_recordings(page, compared, tmp_path):
+    page.work = at_once(page)
+    tab = look_at(page, "Recording")._mapping
+    tab._fold()
+    tab._name.value = str(tmp_path / "columns.toml")
+    (path,) = [each.opened.path for each in compared.files]
+    page.become(with_role(compared, path, Role.VALIDATION))
+    before, (_, unit) = page.session, tab._widgets["chamber_a.pressure_pa"]
+    right = unit.value
+
+    unit.value = "kg"
+    tab._apply()
+    assert "does not fit" in page._status.text and page.session is before
+    unit.value = {"bar": "Pa", "Pa": "bar"}[right]
+    tab._apply()
+    assert "chamber_a.pressure" in page._status.text and page.session is before
+    assert not (tmp_path / "columns.toml").exists()
+
+    unit.value = right
+    tab._apply()
+    assert page.session.now.rig_file == str(tmp_path / "columns.toml")
+    assert [each.role for each in page.session.files] == [Role.VALIDATION]
