@@ -14,6 +14,7 @@ from studies.page.control_tasks import linearise
 from studies.page.jobs import Told
 from studies.page.look import NARROWEST
 from studies.page.missing_tab import _bars
+from studies.page.modes_tab import PLACED
 from studies.page.pages import all_tabs
 from studies.page.session import Session, with_rig
 from studies.page.view import Page
@@ -120,3 +121,20 @@ def test_the_name_of_the_only_effect_is_never_cut():
     bars = _bars((row,))
 
     assert bars.min_width >= bars.min_border_left + NARROWEST
+
+
+def test_a_number_that_is_missing_is_asked_for(page):
+    modes, design = look_at(page, "Modes"), look_at(page, "Design and check")
+    modes._kind.value, modes._number.value, design._runs.value = PLACED, None, None
+
+    for press, what in ((modes._linearise, "modes"), (design._check, "plants")):
+        press()
+        assert f"{what}: is no number of them" in page._status.text
+
+
+def test_a_word_typed_as_a_specification_is_not_a_file(page):
+    tab = look_at(page, "Design and check")
+
+    tab._judge("soft")
+
+    assert "spec:1" in tab._verdict.text and "no such file" not in tab._verdict.text

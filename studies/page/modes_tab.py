@@ -9,7 +9,7 @@ from studies.page.control_verbs import modes_action, with_linearised
 from studies.page.drawn import as_html
 from studies.page.look import button, column, guide, put, row, text, wide
 from studies.page.session import Role, Session, recordings
-from studies.page.verbs import require_rig
+from studies.page.verbs import counted, require_rig
 from studies.text import number
 from workbench.units import display_scale, display_unit, public_name
 
@@ -107,9 +107,13 @@ class ModesTab:
 
     def _linearise(self) -> None:
         kind = self._kind.value
-        placed = int(self._number.value) if kind == PLACED else None
         from studies.page.control_tasks import ModeChoice
 
+        placed, number = None, self._number.value
+        if kind == PLACED:
+            if not self._page.allows(lambda _: counted(number, "modes")):
+                return
+            placed = counted(number, "modes")
         self._start(ModeChoice(kind == REGIMES, placed))
 
     def _by_hand(self) -> None:

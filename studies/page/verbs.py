@@ -69,6 +69,19 @@ def named(path: str, what: str, example: str) -> str:
     return path
 
 
+def counted(typed: float | None, what: str) -> int:
+    """A number that was typed.
+
+    Raises
+    ------
+    InputError
+        If it is not a whole one from 1 on.
+    """
+    if typed is None or typed < 1 or typed != int(typed):
+        raise InputError(Message("is no number of them", what, "a whole number from 1 on"))
+    return int(typed)
+
+
 def with_checked(session: Session, found: tuple[Finding, ...]) -> Session:
     """What the gate found; it changes nothing, so it is no action."""
     return replace(session, checked=found)
