@@ -44,7 +44,7 @@ class DesignTab:
         self._by_mode = ByMode(self._page)
         self._spec = TextAreaInput(
             title="Specification; the verdict follows as you type", rows=8, width=520,
-            name="specification",
+            name="specification", stylesheets=[sheet("textarea { padding-top: 6px; }")],
         )  # fmt: skip
         self._spec.on_change("value_input", lambda _a, _o, new: self._judge(new))
         self._verdict, self._loops = text(name="spec_verdict"), text()
