@@ -11,6 +11,7 @@ from bokeh.document import Document
 from linearize.standard import standard_modes
 from studies.cuts_file import modes_by_cuts
 from studies.page import tasks
+from studies.page.control_tasks import ModeChoice, modes_of
 from studies.page.control_verbs import with_offers
 from studies.page.mode_cuts import boundaries, cuts_of, cuts_text, moved
 from studies.page.offers import mode_offers
@@ -147,6 +148,24 @@ def test_cuts_of_standard_modes_are_a_file_that_gives_them_again_and_move(tmp_pa
     assert found == further
     assert found["slide.position_m"][0].upper == pytest.approx(0.11)
     assert found["valve.command_v"] == cuts["valve.command_v"]
+
+
+def test_cuts_of_two_browser_tabs_do_not_mix_in_their_file(tmp_path):
+    rig = default_rig("servo_drive")
+    cuts = cuts_of(standard_modes(rig.plant))
+    end = next(each for each in boundaries(cuts) if each.signal == "slide.position_m")
+    one, other = (
+        ModeChoice(
+            cuts_file=str(tmp_path / "cuts.toml"), cuts=cuts_text(moved(cuts, [(end, place)]))
+        )
+        for place in (0.11, 0.13)
+    )
+
+    modes_of(rig, (), one)
+    modes_of(rig, (), other)
+
+    again = cuts_of(modes_of(rig, (), one))
+    assert again["slide.position_m"][0].upper == pytest.approx(0.11)
 
 
 def test_modes_that_are_no_product_of_intervals_have_no_cuts_to_move():
