@@ -9,8 +9,9 @@ errors differ by half seem to do the same.  Once each has been settled (see
 
 with n the recorded values of an output over their correlation time, the mean of all outputs and
 those of the first in the ranking for all: outputs err with the same motion, and one that repeats
-its error longer tells no less of it.  It orders a tie and decides which three of a crowd are printed; what is tied stays tied, since the
-small errors that every model has weigh as much as the difference between two such rivals.
+its error longer tells no less of it.  It orders a tie and decides which three of a crowd are
+printed; what is tied stays tied, since the small errors that every model has weigh as much as the
+difference between two such rivals.
 
 Source: Box and Draper 1965, "The Bayesian estimation of common parameters from several responses"
 (their determinant, here of a diagonal covariance); diagnosis.md 1.6.
@@ -53,7 +54,7 @@ def surprise(row: Ranked, leader: Ranked) -> float:
 
 
 def _of_errors(fit: Fit, first: Fit) -> float:
-    """n times the sum over outputs of log(mean square error), which is never below the noise."""
+    """Effective samples times the sum of log(mean square error), never below the noise."""
     windows = fit.windows
     recorded = (windows.weight > 0).sum(axis=2)
     squares = ((fit.residual * windows.scale[:, :, None]) ** 2).sum(axis=(1, 2))
