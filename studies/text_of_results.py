@@ -51,6 +51,7 @@ def _imitated_text(leader: Ranked) -> list[str]:
     return [
         f"if {leader.candidate.name} is the truth, {name} would explain {percent(share)} of it"
         for name, share in leader.imitated_by.items()
+        if name in leader.tied_with
     ]
 
 

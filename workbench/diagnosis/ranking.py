@@ -45,8 +45,9 @@ def ranked(
         r.candidate.name: refitted_row(problem, r, tied, by_name.get(r.candidate.name))
         for r in refits
     }
-    for name in (each for each in names if each in by_name):
-        shares = {n: imitation(by_name[name], by_name[n]) for n in tied[name] if n in by_name}
+    for name in (each for each in together if each in by_name):
+        alike = (n for n in together if n != name and n in by_name)
+        shares = {n: imitation(by_name[name], by_name[n]) for n in alike}
         rows[name] = replace(rows[name], imitated_by=shares)
     if crowd:
         rows[names[0]] = replace(rows[names[0]], crowd=crowd)

@@ -80,8 +80,8 @@ class Ranked:
     tied_with
         Public names of the candidates that cannot be told apart from it here.
     imitated_by
-        Of those that it is tied with: the share of its effect on this recording that each would
-        explain, were it the truth.
+        Of all that do the same: the share of its effect on this recording that each would explain,
+        were it the truth.
     compensable
         Share of its effect on this recording that the fitted parameters can imitate.
     accepted, reasons

@@ -26,9 +26,9 @@ STEADY = 0.02  # of a size, by which the last round may still move it
 
 
 def with_settled_sizes(problem: Problem, ranking: tuple[Ranked, ...]) -> tuple[Ranked, ...]:
-    """The ranking with its leader and what is tied with it settled; the order stays."""
+    """The ranking with its leader and all that do the same settled; the order stays."""
     leader = ranking[0]
-    named = {leader.candidate.name, *leader.tied_with}
+    named = {leader.candidate.name, *leader.tied_with, *leader.crowd}
     return tuple(
         _settled_row(problem, row) if row.fit and row.candidate.name in named else row
         for row in ranking
