@@ -37,6 +37,25 @@ Parts = dict[str, ca.MX]
 Call = Callable[..., list[np.ndarray]]
 
 
+@dataclass(frozen=True)
+class Window:
+    """What an estimate carries: the tape of :class:`Horizon`, and the newest X with covariance."""
+
+    tape: np.ndarray
+    X: np.ndarray
+    P: np.ndarray
+
+
+@dataclass(frozen=True)
+class Step:
+    """A step: the window behind it, its length, if bounds were active, and the sample's ``nis``."""
+
+    window: Window
+    length: float
+    bounded: bool
+    nis: float
+
+
 @dataclass(frozen=True, kw_only=True)
 class Horizon:
     """The functions of a window.  All that is known of it stands in one column, the tape.

@@ -7,8 +7,8 @@ One Gauss-Newton step per sample (real-time iteration) from the last path, shift
 :class:`Horizon` for how it is taken.  A step that does not lower the cost is halved.  Bounds that
 the step would pass are held by a small QP, exact because the problem condenses to X_N; what is
 constant over the window keeps them in all of it.  Where no step lowers the cost, something is not
-finite, or the answer comes late, the estimate is that of the extended Kalman filter, and the notes
-say so.
+finite, the newest sample is missed by far, or the answer comes late, the estimate is that of the
+extended Kalman filter, and the notes say so.
 
 On a linear plant with squared errors every step is exact and the estimate is the Kalman filter's.
 
@@ -27,7 +27,7 @@ from time import perf_counter
 import numpy as np
 
 from estimators.extended_kalman import ExtendedKalman
-from estimators.horizon import Horizon
+from estimators.horizon import Horizon, Step, Window
 from estimators.losses import Loss, Squared
 from estimators.nearest_inside import OutsideError, nearest_inside
 from estimators.stochastic_plant import StochasticPlant
@@ -38,6 +38,7 @@ from workbench.rosenbrock import COARSEST_STEP_S
 HALVINGS = 4
 GROWTH, ROUNDING = 1e-3, 1e-9  # share and size by which a step may raise the cost: at rest, the
 # kinks of friction leave no direction that lowers it
+FAR = 10.0  # standard deviations of a sensor
 
 
 def allowed(cost: float) -> float:
@@ -52,25 +53,6 @@ def sound(P: np.ndarray) -> bool:
 
 class LostError(ArithmeticError):
     """No step lowers the cost, or something is not finite."""
-
-
-@dataclass(frozen=True)
-class Window:
-    """What an estimate carries: the tape of :class:`Horizon`, and the newest X with covariance."""
-
-    tape: np.ndarray
-    X: np.ndarray
-    P: np.ndarray
-
-
-@dataclass(frozen=True)
-class Step:
-    """A step: the window behind it, its length, if bounds were active, and the sample's ``nis``."""
-
-    window: Window
-    length: float
-    bounded: bool
-    nis: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -139,6 +121,7 @@ class MovingHorizon(StochasticPlant):
         begun, failed = perf_counter(), False
         try:
             step = self._stepped(last.memory, self._news(command, measurement), begun)
+            failed = self._astray(step.window)
         except (LostError, OutsideError, np.linalg.LinAlgError):
             failed = True
         late = perf_counter() - begun > self.deadline_s
@@ -198,6 +181,19 @@ class MovingHorizon(StochasticPlant):
         return np.concatenate(
             [command, np.where(received, measurement, 0.0) / self._noise, received]
         )
+
+    def _astray(self, window: Window) -> bool:
+        """Whether the newest sample is further off than Gaussian noise and a free state leave it.
+
+        A step through an impact can lower the cost and miss what the impact did to the path.  What
+        is constant over the window may have to leave an error, and so may a loss that lets go.
+        """
+        if self.constants or not isinstance(self.loss, Squared):
+            return False
+        y, expected, there = (
+            self.functions.part(window.tape, name)[:, -1] for name in ("y", "expected", "received")
+        )
+        return bool((there * np.abs(y - expected) > FAR).any())
 
     def _anew(self, X: np.ndarray, P: np.ndarray) -> Window:
         """A window that starts from what is known now."""

@@ -23,6 +23,7 @@ from workbench.filtering import correct, predict
 from workbench.plant_filter import PlantFilter
 
 SAME = 0.9  # of the deviation at first or without outputs: what leaves more tells next to nothing
+ROUNDING = 1e-9  # of a scale: what is known better, as a coil's current is, counts as certain
 CERTAIN = 0.05  # of its scale: what the model alone knows that well need not be seen
 
 
@@ -59,7 +60,8 @@ def observed(found: PlantFilter, states: np.ndarray, commands: np.ndarray) -> Ob
         deviations.append((np.sqrt(P.diagonal()), np.sqrt(blind.diagonal())))
         step = F[:, k * n : (k + 1) * n]
         P, blind = (predict(zero, each + half, step, half)[1] for each in (P, blind))
-    within, without = np.median(deviations, axis=0) * size
+    known = np.median(deviations, axis=0)
+    within, without = np.where(known < ROUNDING, 0.0, known) * size
     return Observed(
         *(dict(zip(names, map(float, v), strict=True)) for v in (within, without, size))
     )

@@ -16,62 +16,51 @@ of filters); here the mode is known by its box and its guards, not by likelihood
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from estimators.scheduled_kalman import ScheduledKalman
+from estimators.wrapped import Wrapped
 from workbench.contracts import Estimate, Estimator
 from workbench.errors import Message, UnknownNameError
-from workbench.plant import Plant
 
 NEXT, AT = ",", "@"
 
 
 @dataclass(frozen=True, kw_only=True)
-class PerMode:
-    """See the module; the note ``speaks`` counts the estimators from the usual one, 0.
+class PerMode(Wrapped):
+    """See the module; ``inner`` is the usual one, note ``speaks`` counts from it, 0.
 
     Attributes
     ----------
+    others
+        Those of some modes; the states that all estimators have are estimated.
     finder
         Whose modes they are.
-    inner
-        The estimators, the usual one first; the states that all of them have are estimated.
     speaks
-        Which of them speaks in each mode of the finder.
+        Which estimator speaks in each mode of the finder, 0 the usual one.
     """
 
+    others: tuple[Estimator, ...]
     finder: ScheduledKalman
-    inner: tuple[Estimator, ...]
     speaks: tuple[int, ...]
 
-    @property
-    def sample_time_s(self) -> float:
-        """That of all of them."""
-        return self.finder.sample_time_s
-
-    @property
-    def plant(self) -> Plant:
-        """The plant of all of them."""
-        return self.finder.plant
-
-    @property
-    def measurement_noise(self) -> Mapping[str, float]:
-        """That of all of them."""
-        return self.finder.measurement_noise
-
     def start(self, measurement: np.ndarray) -> Estimate:
-        return self._told(0, tuple(each.start(measurement) for each in self.inner))
+        return self._told(0, tuple(each.start(measurement) for each in self._bank))
 
     def update(self, last: Estimate, command: np.ndarray, measurement: np.ndarray) -> Estimate:
         now = tuple(
             each.update(before, command, measurement)
-            for each, before in zip(self.inner, last.memory, strict=True)
+            for each, before in zip(self._bank, last.memory, strict=True)
         )
         x = last.memory[0].pick(self.finder.sampled.hybrid.model.states)
         return self._told(self.speaks[self.finder.mode_at(x, command)], now)
+
+    @property
+    def _bank(self) -> tuple[Estimator, ...]:
+        return (self.inner, *self.others)
 
     def _told(self, k: int, every: tuple[Estimate, ...]) -> Estimate:
         """The estimate of one, in the states that all have; all of them are its memory."""
@@ -118,4 +107,5 @@ def chosen_per_mode(
     if AT in parts[0]:
         what = f"{parts[0].strip()!r} comes first, which is for all other modes"
         raise UnknownNameError(Message(what, expected=f"{names[0]}{NEXT}{choice}"))
-    return PerMode(finder=finder, inner=tuple(map(make, different)), speaks=(*speaks.tolist(),))
+    usual, *others = map(make, different)
+    return PerMode(inner=usual, others=(*others,), finder=finder, speaks=(*speaks.tolist(),))

@@ -6,8 +6,10 @@ that a state without noise does no harm, and every covariance is made symmetric.
 
 A bristle follows the velocity of each point, and is neither spread nor corrected: see
 :class:`workbench.plant_filter.PlantFilter`, whose scaled states and noise are these too, half of it
-before and half after the step.  Where a point leaves the plant's range, so that its state is no
-number, the extended filter makes that step and the note ``fallback`` is 1.
+before and half after the step.  Nor is the coil and armature of a switched valve, which follow the
+command within milliseconds: points a share of a stroke apart would bounce on the stops.  Where a
+point leaves the plant's range, so that its state is no number, the extended filter makes that step
+and the note ``fallback`` is 1.
 
 Source: Julier and Uhlmann 2004, "Unscented filtering and nonlinear estimation"; van der Merwe 2004
 for points and weights; Särkkä 2013, "Bayesian filtering and smoothing", algorithm 5.14.
@@ -25,6 +27,7 @@ import numpy as np
 from estimators.extended_kalman import ExtendedKalman
 from estimators.stochastic_plant import StochasticPlant
 from workbench.contracts import Estimate
+from workbench.effects.solenoid_valve import SolenoidValve
 
 CENTRE, NORMAL = 2.0, 0.0  # beta for a normal distribution, kappa
 
@@ -106,7 +109,10 @@ class UnscentedKalman(StochasticPlant):
 
     @cached_property
     def _free(self) -> np.ndarray:
-        return np.flatnonzero(self.extended.filter.corrected)
+        """Rows that are spread: what is corrected, but for what a switched valve's coil moves."""
+        valves = tuple(f"{e.name}." for e in self.plant.effects if isinstance(e, SolenoidValve))
+        names, rows = self.plant.model.states, np.flatnonzero(self.extended.filter.corrected)
+        return np.array([k for k in rows if not (k < len(names) and names[k].startswith(valves))])
 
     @cached_property
     def _noise(self) -> np.ndarray:

@@ -220,14 +220,14 @@ def _passed_over(plant: Plant, state: str) -> bool:
 def _stand_in(plant: Plant, state: str) -> Expression:
     """What takes the place of a state that is left out.
 
-    Gas at supply temperature, a control chamber at ambient pressure, an armature where its command
-    drives it; no lag, no bristle, no droop, no warmth.
+    Gas at supply temperature, or that of the room where nothing supplies it, a control chamber at
+    ambient pressure, an armature where its command drives it; no lag, bristle, droop or warmth.
     """
     member, _, quantity = state.rpartition(".")
     now = plant.model.conditions
     owner = next(m for m in plant.members if m.name == member)
     if quantity == "mass_kg":
-        gas, room_k = now[member], now["supply"].temperature_k
+        gas, room_k = now[member], now[_source(plant)].temperature_k
         return gas.pressure_pa * gas.volume_m3 / (gas.gas_constant_j_kg_k * room_k)
     if quantity == "lagged_v":
         return now[member].entering_v
@@ -242,10 +242,15 @@ def _stand_in(plant: Plant, state: str) -> Expression:
     return ca.SX(0.0)
 
 
+def _source(plant: Plant) -> str:
+    """Where the gas comes from."""
+    return "supply" if "supply" in plant.model.conditions else "atmosphere"
+
+
 def _left_out(plant: Plant) -> Iterator[LeftOut]:
     for name in plant.model.states:
         if name.endswith(".mass_kg"):
-            room = "gas at supply temperature (level 3 of physics.md 1.2)"
+            room = f"gas at {_source(plant)} temperature (level 3 of physics.md 1.2)"
             yield LeftOut(name, room, "temperature moves the flow by a few per cent only")
     for member in plant.effects:
         if isinstance(member, DeadZone):

@@ -23,6 +23,7 @@ from studies.followers import (
 from studies.kept import Kept
 from studies.study import Claim, Extent, Outcome, Study
 from studies.text import columns, number
+from studies.versions import work_folder
 from studies.yardsticks import LIMITS, PAYLOADS_KG, Draw, draws, figures_of, measured
 
 if TYPE_CHECKING:
@@ -60,7 +61,7 @@ Rows = Mapping[tuple[str, float], Sequence[Mapping[str, float]]]
 
 def run(folder: Path, extent: Extent, say: Callable[[str], None]) -> Outcome:
     """Every design with every payload, draw by draw; a second start goes on."""
-    kept, rows = Kept(folder / "work" / "rows.jsonl"), {}
+    kept, rows = Kept(work_folder(folder) / "rows.jsonl"), {}
     for name, (method, numbers) in DESIGNS.items():
         for draw in draws(DRAWS[extent]):
             key = f"{name} {draw.payload_kg:g} {draw.number}"

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from studies.kept import Kept, Row
-from studies.versions import code_of_loops
+from studies.versions import work_folder
 from studies.workers import Piece, chosen_workers
 
 OFTEN = 20  # times that a study tells how far it is
@@ -26,6 +26,5 @@ def kept_rows(
         if done % every == 0 or done == of:
             say(f"{done} of {of} {what}")
 
-    kept = Kept(folder / "work" / "rows.jsonl")
-    keyed = {f"{code_of_loops()[:16]} {key}": piece for key, piece in pieces.items()}
-    return chosen_workers().keep(kept, work, keyed, tell)
+    kept = Kept(work_folder(folder) / "rows.jsonl")
+    return chosen_workers().keep(kept, work, pieces, tell)

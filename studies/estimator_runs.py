@@ -11,13 +11,16 @@ import numpy as np
 from scipy.stats import chi2
 
 from estimators.foreseen import Foresight
+from studies.text import shown
 from workbench.called import result
 from workbench.contracts import Estimate
 from workbench.plant import Plant
 from workbench.recording import Recording
 from workbench.simulation import inputs
+from workbench.units import public_name
 
 BAND = 0.95
+BEYOND = 1e6  # typical sizes of a state: an estimate that says more is lost
 LAGS = 20  # of the autocorrelation of innovations
 
 
@@ -64,16 +67,17 @@ def follow(estimator: Any, commands: np.ndarray, measured: np.ndarray, every: in
     ArithmeticError
         If the estimator is lost, with the sample.
     """
-    sight = Foresight(estimator)
+    sight, plant = Foresight(estimator), estimator.plant
+    sizes = dict(zip(plant.model.states, plant.scale, strict=True))
     estimate = estimator.start(measured[:, 0])
-    sent, rows, told = estimator.plant.nominal[0], [], []
+    sent, rows, told = plant.nominal[0], [], []
     for k in range(measured.shape[1]):
         y = measured[:, k]
         seen = (np.full(len(y), np.nan), np.nan, 0.0)
         if every and k % every == 0 and np.isfinite(y).any():
             seen = _innovation(*sight.outputs(sight.blind(estimate, sent), sent), y)
         begun = perf_counter()
-        estimate = _updated(estimator, estimate, sent, y, k)
+        estimate = _updated(estimator, estimate, sent, y, k, sizes)
         took = perf_counter() - begun
         rows.append((estimate.state, estimate.covariance, took, *seen))
         told.append(estimate.notes)
@@ -82,14 +86,24 @@ def follow(estimator: Any, commands: np.ndarray, measured: np.ndarray, every: in
 
 
 def _updated(
-    estimator: Any, last: Estimate, command: np.ndarray, y: np.ndarray, k: int
+    estimator: Any,
+    last: Estimate,
+    command: np.ndarray,
+    y: np.ndarray,
+    k: int,
+    sizes: Mapping[str, float],
 ) -> Estimate:
+    """The next estimate, unless it says more than so many typical ``sizes`` of a state."""
     try:
         now = estimator.update(last, command, y)
     except RuntimeError as error:  # CasADi's word for a matrix that cannot be factorised
         raise ArithmeticError(f"lost at sample {k}: {str(error)[:60]}") from error
     if not np.isfinite(now.state).all():
         raise ArithmeticError(f"lost at sample {k}: its state is no number")
+    for name, value in zip(now.names, now.state, strict=True):
+        if abs(value) > BEYOND * sizes.get(name, np.inf):
+            what = f"{public_name(name)} is {shown(value, name, 2)}"
+            raise ArithmeticError(f"lost at sample {k}: {what}")
     return now
 
 

@@ -49,6 +49,7 @@ from studies.estimator_truths import (
 )
 from studies.kept import Kept
 from studies.study import Extent, Outcome, Study
+from studies.versions import work_folder
 
 JUDGED = ("ekf", "ukf", "mhe")  # for consistency; the others do not know the disturbance
 RUNS = 50
@@ -81,7 +82,8 @@ class Work:
 
 def run(folder: Path, extent: Extent, say: Callable[[str], None]) -> Outcome:
     """All parts of the study, piece by piece."""
-    work = Work(folder / "work", extent, Kept(folder / "work" / "rows.jsonl"), say)
+    place = work_folder(folder)
+    work = Work(place, extent, Kept(place / "rows.jsonl"), say)
     consistency = {kind: _consistency(work, kind) for kind in (EXACT, DRAWN)}
     white = {kind: _coloured(work, kind) for kind in (EXACT, DRAWN)}
     velocity = {plant: _velocity(work, plant) for plant in VELOCITIES}

@@ -22,6 +22,7 @@ from studies.checking import apart, drawn, styled_figures
 from studies.kept import Kept, Row
 from studies.shift_check import SHIFTS, Shift, ShiftCheck, check_shifts, shift_table
 from studies.study import Claim, Extent, Outcome, Study
+from studies.versions import work_folder
 from studies.workers import chosen_workers
 from workbench.contracts import Controller
 from workbench.plant import Plant
@@ -44,7 +45,7 @@ def run(folder: Path, extent: Extent, say: Callable[[str], None]) -> Outcome:
         say(f"supply of {1e-5 * supply_pa:g} bar")
         plant = gearbox().with_values({SUPPLY: supply_pa})
         supplies[supply_pa] = check_shifts(plant, {HYBRID: hybrid(plant)}, SHIFTS).rows
-    rows, known = _drawn_rows(Kept(folder / "work" / "rows.jsonl"), DRAWS[extent], say)
+    rows, known = _drawn_rows(Kept(work_folder(folder) / "rows.jsonl"), DRAWS[extent], say)
     text = "\n\n".join(
         [
             shift_table(beside.rows),

@@ -3,8 +3,8 @@
 The full grid is everything: single effects, nothing, laws outside the catalogue, pairs, recordings
 too weak to tell, and other widths of the priors.  The quick one is a sample of one seed, without
 other widths.  Two processes answer; each answer is kept on disk at once, so a second start goes
-on where a first one ended.  Visible is a hidden effect whose own refit removes more than 30 % of
-the misfit.
+on where a first one ended, and tells how many answers are of other code.  Visible is a hidden
+effect whose own refit removes more than 30 % of the misfit.
 
 ``python -m studies.hidden_study --kind law --plant servo_drive`` answers a part of the full grid.
 
@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -26,16 +27,27 @@ from studies.hidden_rows import Kind, Row, plain, row_again
 from studies.hidden_tasks import SLOW, Task, recorded, tasks
 from studies.kept import Kept
 from studies.study import Extent, Outcome, Study
+from studies.versions import code_of_loops
 
 PROCESSES = 2
-ANSWERS = "answers.jsonl"
+ANSWERS, CODE = "answers.jsonl", "code"
 
 Say = Callable[[str], None]
 
 
 def run(folder: Path, extent: Extent, say: Say) -> Outcome:
     """Answer what is not answered yet, and tell what all answers say."""
-    return outcome(finished(folder, tasks(extent), say), extent)
+    asked = tasks(extent)
+    found = outcome(finished(folder, asked, say), extent)
+    return replace(found, text=f"{found.text}\n\n{which_code(folder, asked)}")
+
+
+def which_code(folder: Path, asked: Sequence[Task]) -> str:
+    """How many answers are of other code than this: they take too long to be asked again."""
+    kept = Kept(folder / ANSWERS)
+    other = sum(kept.rows[task.key].get(CODE) != code_of_loops() for task in asked)
+    again = f"; a line that is taken out of {ANSWERS} is asked again" if other else ""
+    return f"{other} of {len(asked)} answers are of other code than this{again}"
 
 
 def finished(
@@ -49,7 +61,7 @@ def finished(
         groups.append([task for task in there if task.key not in kept])
         say(f"{plant}: {len(groups[-1])} of {len(there)} cases to answer")
     for task, row in _answers(groups, processes):
-        kept.add(task.key, plain(row))
+        kept.add(task.key, {**plain(row), CODE: code_of_loops()})
         right = "right" if row.right else "WRONG"
         say(f"{task.plant} {row.hidden}:{row.seed} -> {row.first}, {row.verdict}, {right}")
     return [row_again(kept.rows[task.key]) for task in asked]
@@ -98,7 +110,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     said = outcome(
         finished(asked.output, part, lambda line: print(line, flush=True), asked.processes)
     )
-    print(said.text, *(f"{claim.claim}: {claim.found}" for claim in said.claims), sep="\n\n")
+    told = which_code(asked.output, part)
+    print(said.text, told, *(f"{claim.claim}: {claim.found}" for claim in said.claims), sep="\n\n")
 
 
 STUDY = Study(

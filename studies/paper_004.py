@@ -35,6 +35,7 @@ from studies.soft_joint_horizon import Setting, Worth, lags, needed, tracked, wo
 from studies.soft_joint_improved import STUCK, Improved, improved
 from studies.study import Claim, Extent, Outcome, Study
 from studies.text import columns, number
+from studies.versions import work_folder
 from workbench.plant import Plant
 from workbench.plants.soft_joint import PRESSURE
 
@@ -55,7 +56,7 @@ HALF, EMPTY_PSI, APART, CLOSE = 0.5, 16.5, 0.2, 0.02
 
 def run(folder: Path, extent: Extent, say: Callable[[str], None]) -> Outcome:
     """Record, fit, track, improve and judge; finished pieces stay in the folder."""
-    work = folder / "work"
+    work = work_folder(folder)
     say("records of the truth")
     data = recorded(DURATION_S[extent], work / f"records_{extent.value}.npz")
     kept = Kept(work / f"pieces_{extent.value}.jsonl")

@@ -55,7 +55,7 @@ def _recording_text(each: EstimatedRecording) -> str:
 def _predictions(each: EstimatedRecording) -> str:
     horizons = [*each.rows[0].horizons]
     head = ["estimator", "output", *(f"{1e3 * h:g} ms" for h in horizons)]
-    head += ["nis", "coloured", "median us", "p99 us"]
+    head += ["nis", "coloured", "median ms", "p99 ms"]
     lines = [
         [
             row.name,
@@ -63,8 +63,8 @@ def _predictions(each: EstimatedRecording) -> str:
             *(shown(row.horizons[h][k], name, 3) for h in horizons),
             number(row.nis, 3),
             percent(row.coloured[k]),
-            number(1e6 * row.median_s, 3),
-            number(1e6 * row.p99_s, 3),
+            number(1e3 * row.median_s, 3),
+            number(1e3 * row.p99_s, 3),
         ]
         for row in each.rows
         for k, name in enumerate(each.outputs)

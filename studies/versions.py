@@ -19,7 +19,12 @@ STANDS_ON = (
 @cache
 def code_of_loops() -> str:
     """A hash of the code that closes a loop; figures, page and reports are left out."""
-    return _hash([*ROOT.glob("studies/*.py"), *_python(BELOW)])
+    return _hash([*ROOT.glob("studies/*.py"), *_python((*BELOW, "studies/truth"))])
+
+
+def work_folder(folder: Path) -> Path:
+    """Where a study keeps its finished pieces: those of other code lie beside and are not read."""
+    return folder / "work" / code_of_loops()[:16]
 
 
 @cache

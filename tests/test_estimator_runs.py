@@ -169,6 +169,22 @@ def test_an_estimator_that_is_lost_says_where(error):
         follow(Failing(on_its_start(), error), np.zeros((1, 5)), np.zeros((1, 5)), 0)
 
 
+def test_an_estimate_that_no_plant_can_come_to_is_lost_too():
+    begun = on_its_start()
+
+    class RunsAway:
+        plant = begun.plant
+
+        def start(self, measurement):
+            return begun.start(measurement)
+
+        def update(self, last, command, measurement):
+            return replace(last, state=last.state + np.array([4e5, 0.0]))
+
+    with pytest.raises(ArithmeticError, match=r"position is 4e\+08 mm"):
+        follow(RunsAway(), np.zeros((1, 5)), np.zeros((1, 5)), 0)
+
+
 @pytest.mark.parametrize("name", ["kalman", "imm"])
 def test_the_noise_of_ones_own_innovations_is_that_which_drove_the_plant(name):
     """From a thirtieth of it on; on a linear plant both are the Kalman filter."""

@@ -1,5 +1,7 @@
 """The study of estimators: its truths, what it claims of numbers, and the disturbance's size."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -79,6 +81,20 @@ def test_a_flow_adds_its_gas_at_the_temperature_of_the_chamber():
 
     assert (with_flow.pressure_pa - without.pressure_pa)[0, 0] == pytest.approx(rise, rel=0.02)
     assert abs(with_flow.pressure_pa - without.pressure_pa)[1, 0] < 0.05 * rise
+
+
+@pytest.mark.parametrize("lag_s", [0.0, 2e-3])
+def test_a_pressure_sensor_sees_the_gas_that_a_disturbance_brings(lag_s):
+    """Without a lag it reads the pressure itself; with one what the lag lets through."""
+    drives = stack([replace(NOMINAL, pressure_lag_s=lag_s)])
+    prepared, state = bench(drives), d.at_rest(drives, np.array([0.1]))
+    steady = true.Disturbance(np.zeros((20, 1)), np.full((20, 2, 1), 1e-3))
+    for k in range(20):
+        state = true.disturbed(prepared, state, np.array([4.95]), steady, k)
+    risen_pa = state.pressure_pa - d.at_rest(drives, np.array([0.1])).pressure_pa
+    per_s = risen_pa / 20e-3
+
+    assert state.pressure_pa - state.read_pa == pytest.approx(per_s * lag_s, rel=0.05, abs=1e-6)
 
 
 @pytest.mark.slow

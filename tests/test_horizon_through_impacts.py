@@ -1,11 +1,13 @@
-"""Moving-horizon estimation where the plant hits something within a sample."""
+"""Estimation where the plant hits something within a sample."""
 
 import numpy as np
 import pytest
 
 from estimators.moving_horizon import MovingHorizon, sound
-from workbench.plants.gearbox import gearbox
+from estimators.unscented_kalman import UnscentedKalman
+from workbench.plants.gearbox import COMMANDS, gearbox
 from workbench.plants.servo_drive import COMMAND, OUTPUTS, servo_drive
+from workbench.plants.vertical_cylinder import vertical_cylinder
 from workbench.polytropic import with_polytropic_gas
 from workbench.recording import Recording
 from workbench.simulation import simulate
@@ -47,6 +49,62 @@ def test_a_slide_that_hits_its_stop_is_followed(uncompiled):
     assert np.abs(truth["slide.velocity_m_s"]).max() > 1.0  # it arrives at full speed
     assert all(sound(e.memory.P) for e in found)
     assert np.std((velocity - truth["slide.velocity_m_s"])[20:]) < 0.05
+
+
+def test_a_step_that_misses_what_an_impact_did_gives_way_to_the_filter(uncompiled):
+    """With next to no process noise a path that went wrong at the stop would be believed."""
+    plant = vertical_cylinder().lean()
+    (pressure,) = plant.model.measured_inputs
+    u = 2.1e5 + 3e4 * np.sin(9e-3 * np.arange(160))
+    truth = simulate(plant, Recording("truth", 1e-3, {pressure: u}))
+    noise = dict.fromkeys(plant.measured, 2e-5)
+    estimator = MovingHorizon(
+        plant=plant.with_inputs_commanded(),
+        sample_time_s=1e-3,
+        measurement_noise=noise,
+        process_noise={"rod.velocity_m_s": 1e-3},
+        initial_deviation={"rod.position_m": 2e-5, "rod.velocity_m_s": 1e-2},
+    )
+
+    found = followed(estimator, truth, noise)
+    off = np.array([e.pick(plant.measured)[0] for e in found]) - truth[plant.measured[0]]
+    given_way = sum(e.notes["fallback"] for e in found)
+
+    assert np.ptp(np.sign(truth["rod.velocity_m_s"])) == 2.0  # it rebounds
+    assert np.abs(off).max() < 3 * 2e-5
+    assert 1 <= given_way < 5
+
+
+def test_points_of_the_unscented_filter_do_not_throw_armatures_against_their_stops(uncompiled):
+    """Half of their stroke unknown at the start, and process noise as small as a likelihood finds.
+
+    Armatures follow their command; spread by that much, they would bounce for ever in the mean.
+    """
+    plant = gearbox().lean()
+    u = np.zeros((2, 60))
+    u[0, 20:] = 1.0
+    truth = simulate(plant, Recording("truth", 1e-3, dict(zip(COMMANDS, u, strict=True))))
+    noise = {n: 20e-6 if n.endswith("_m") else 700.0 for n in plant.measured}
+    sizes = dict(zip(plant.model.states, plant.scale, strict=True))
+    valves = {n: 0.5 * s if n.startswith("valve") else 0.01 * s for n, s in sizes.items()}
+    shares = {"velocity_m_s": 0.1, "velocity_rad_s": 0.1, "pressure_pa": 3e-6}
+    estimator = UnscentedKalman(
+        plant=plant,
+        sample_time_s=1e-3,
+        measurement_noise=noise,
+        process_noise={n: shares.get(n.rpartition(".")[2], 0.0) * s for n, s in sizes.items()},
+        initial_deviation=valves,
+    )
+
+    found = followed(estimator, truth, noise)
+
+    for name in plant.measured:
+        off = np.array([e.pick([name])[0] for e in found]) - truth[name]
+        assert np.sqrt(np.mean(off[20:] ** 2)) < noise[name]
+    for k in (1, 2):
+        name = f"valve_{k}.armature_position_m"
+        off = np.array([e.pick([name])[0] for e in found]) - truth[name]
+        assert np.abs(off[20:]).max() < 0.1e-3  # of 1.9 mm
 
 
 @pytest.mark.slow

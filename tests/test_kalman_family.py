@@ -1,5 +1,7 @@
 """The Kalman filters against closed forms and other programs; late, missing and wrong samples."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 from linear_plant import cart
@@ -241,13 +243,21 @@ def test_sensors_of_several_rates_need_no_more_than_holes(name):
 WITH_STATES = [name for name, build in PLANTS.items() if build().state_list]
 
 
-@pytest.mark.parametrize("name", WITH_STATES)
-def test_every_plant_has_a_filter_for_each_of_its_sensors(name, uncompiled):
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [
+        *product(WITH_STATES, ("ekf",)),
+        ("closed_chamber", "kalman"),
+        ("vertical_cylinder", "kalman"),
+    ],
+)
+def test_every_plant_has_a_filter_for_each_of_its_sensors(name, kind, uncompiled):
+    """Modes, too, where nothing supplies the gas and where there are no standard ones."""
     plant = PLANTS[name]().lean().with_inputs_commanded()
     rest = plant.model.h(plant.initial, *plant.nominal).full().ravel()
     for k, output in enumerate(plant.measured):
         single = plant.with_measured(output)
-        estimator = ESTIMATORS["ekf"](
+        estimator = ESTIMATORS[kind](
             plant=single,
             sample_time_s=1e-3,
             measurement_noise={output: 1e-3 * max(abs(rest[k]), 1.0)},

@@ -22,11 +22,19 @@ class Push(Effect):
         yield Force("mass", now["push"].force_n)
 
 
-def pushed(measured):
+@dataclass(frozen=True, kw_only=True)
+class Drag(Effect):
+    """Stops the mass within milliseconds."""
+
+    def terms(self, now):
+        yield Force("mass", -1e4 * now["mass"].velocity_m_s)
+
+
+def pushed(measured, *more, kick=KICK):
     plant = Plant(
         name="pushed",
         parts=(Body(name="mass", mass_kg=1.0),),
-        effects=(Push(name="push"),),
+        effects=(Push(name="push"), *more),
         commands=(Signal("push.force_n", nominal=0.0, lower=-1.0, upper=1.0),),
         measured=(measured,),
     )
@@ -34,7 +42,7 @@ def pushed(measured):
         plant=plant,
         sample_time_s=DT_S,
         measurement_noise={measured: NOISE_M},
-        process_noise={VELOCITY: KICK},
+        process_noise={VELOCITY: kick},
     )
     return observed(found, np.zeros((2, 400)), np.zeros((1, 400)))
 
@@ -55,3 +63,10 @@ def test_a_velocity_does_not_show_where_the_mass_is():
 
     assert found.unseen == (POSITION,)
     assert found.within[VELOCITY] < 0.1 * found.without[VELOCITY]
+
+
+def test_what_has_died_away_to_nothing_counts_as_certain():
+    found = pushed(POSITION, Drag(name="drag"), kick=0.0)
+
+    assert found.within[VELOCITY] == 0.0  # not 1e-100 m/s
+    assert found.within[POSITION] > 0.0

@@ -109,6 +109,13 @@ def test_a_comparison_is_gone_once_the_recordings_are_others(session):
     assert with_role(compared, "validation.csv", Role.TRAINING).compared is None
 
 
+def test_modes_are_gone_once_their_error_is_not_of_the_training_recordings(session):
+    linearised = replace(session, linearised=object())
+
+    assert with_role(linearised, "validation.csv", Role.ASIDE).linearised is not None
+    assert with_role(linearised, "validation.csv", Role.TRAINING).linearised is None
+
+
 def test_the_replay_script_gives_the_rig_that_was_saved(session, folder):
     """Compare, fit, go back, fit again, save: the script writes the same rig file."""
     fitted = tasks.fit(

@@ -92,6 +92,21 @@ def test_tokens_differ_from_run_to_run_and_the_page_is_on_this_machine_alone(ser
     assert {s.getsockname()[0] for s in sockets} == {ADDRESS}
 
 
+def test_a_cancel_of_the_first_reading_is_of_one_browser_tab():
+    from studies.page.jobs import Told
+    from studies.page.server import _Shared
+
+    class Reading:
+        def look(self):
+            return Told(("reading train.csv",))
+
+    one, other = (_Shared(Reading()) for _ in range(2))
+
+    one.cancel()
+
+    assert "cancelled" in one.look().refused and not other.look().ended
+
+
 def test_two_documents_have_sessions_of_their_own(server):
     from bokeh.document import Document
 

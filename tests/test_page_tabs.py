@@ -11,6 +11,7 @@ from bokeh.document import Document
 from linearize.standard import standard_modes
 from studies.cuts_file import modes_by_cuts
 from studies.page import tasks
+from studies.page.control_tasks import ModeChoice, modes_of
 from studies.page.control_verbs import with_offers
 from studies.page.mode_cuts import boundaries, cuts_of, cuts_text, moved
 from studies.page.offers import mode_offers
@@ -19,6 +20,7 @@ from studies.page.session import Role, Session, recordings, with_opened, with_ri
 from studies.page.verbs import with_compared
 from studies.page.view import Page
 from studies.specification import design_numbers, read_specification
+from workbench.errors import InputError
 from workbench.rig import default_rig
 
 
@@ -148,6 +150,24 @@ def test_cuts_of_standard_modes_are_a_file_that_gives_them_again_and_move(tmp_pa
     assert found["valve.command_v"] == cuts["valve.command_v"]
 
 
+def test_cuts_of_two_browser_tabs_do_not_mix_in_their_file(tmp_path):
+    rig = default_rig("servo_drive")
+    cuts = cuts_of(standard_modes(rig.plant))
+    end = next(each for each in boundaries(cuts) if each.signal == "slide.position_m")
+    one, other = (
+        ModeChoice(
+            cuts_file=str(tmp_path / "cuts.toml"), cuts=cuts_text(moved(cuts, [(end, place)]))
+        )
+        for place in (0.11, 0.13)
+    )
+
+    modes_of(rig, (), one)
+    modes_of(rig, (), other)
+
+    again = cuts_of(modes_of(rig, (), one))
+    assert again["slide.position_m"][0].upper == pytest.approx(0.11)
+
+
 def test_modes_that_are_no_product_of_intervals_have_no_cuts_to_move():
     assert cuts_of(standard_modes(default_rig("crr_rig").plant)) == {}
 
@@ -221,3 +241,41 @@ def test_an_effect_that_is_refused_or_cancelled_is_not_ticked(page, compared):
     tab._ticks.active = [0]
 
     assert tab._ticks.active == [] and "no recording is for training" in page._status.text
+
+
+def at_once(page):
+    """Jobs of a page done where it stands, as far as they go."""
+
+    def work(_action, then, task, *arguments, otherwise=quiet):
+        try:
+            found = task(*arguments, quiet)
+        except InputError as error:
+            page.complain(str(error))
+        else:
+            page.attempt(then(found))
+
+    return work
+
+
+def test_columns_in_a_wrong_unit_leave_the_rig_and_its_recordings(page, compared, tmp_path):
+    page.work = at_once(page)
+    tab = look_at(page, "Recording")._mapping
+    tab._fold()
+    tab._name.value = str(tmp_path / "columns.toml")
+    (path,) = [each.opened.path for each in compared.files]
+    page.become(with_role(compared, path, Role.VALIDATION))
+    before, (_, unit) = page.session, tab._widgets["chamber_a.pressure_pa"]
+    right = unit.value
+
+    unit.value = "kg"
+    tab._apply()
+    assert "does not fit" in page._status.text and page.session is before
+    unit.value = {"bar": "Pa", "Pa": "bar"}[right]
+    tab._apply()
+    assert "chamber_a.pressure" in page._status.text and page.session is before
+    assert not (tmp_path / "columns.toml").exists()
+
+    unit.value = right
+    tab._apply()
+    assert page.session.now.rig_file == str(tmp_path / "columns.toml")
+    assert [each.role for each in page.session.files] == [Role.VALIDATION]

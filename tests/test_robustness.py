@@ -7,6 +7,7 @@ from studies.draws import kept_rows
 from studies.kept import Kept
 from studies.robustness import Line, Robustness
 from studies.robustness_study import Draw, measured, outcome, summary
+from studies.versions import work_folder
 from studies.workers import Workers, working_with
 
 N = 200
@@ -79,7 +80,7 @@ def test_two_drives_of_the_study_differ_and_are_the_same_again(tmp_path):
 
     assert rows[0]["found"] == first["found"]
     assert rows[1]["found"] != first["found"]
-    assert len(Kept(tmp_path / "work" / "rows.jsonl").rows) == 2
+    assert len(Kept(work_folder(tmp_path) / "rows.jsonl").rows) == 2
     said = outcome(rows)
     assert all(claim.holds for claim in said.claims if "no draw is lost" in claim.claim)
     assert set(said.figures) == {"spread", "influences"}

@@ -1,4 +1,4 @@
-"""Studies: what is kept of long work, what the rows of the hidden-effect study say, the command."""
+"""Studies: what the rows of the hidden-effect study say, the command."""
 
 import json
 import re
@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from studies import hidden_study, versions
 from studies.command_line import app
 from studies.hidden_answers import counted, widened
 from studies.hidden_benches import BENCHES, SERVO_DRIVE
@@ -38,18 +39,14 @@ def held(found):
     return {claim.claim.partition(",")[0]: claim.holds for claim in found.claims}
 
 
-def test_rows_survive_and_a_line_cut_short_is_left_out(tmp_path):
-    path = tmp_path / "work" / "rows.jsonl"
-    Kept(path).add("a", {"value": 1})
-    with path.open("a", encoding="utf-8") as file:
-        file.write('{"key": "b", "val')
+def test_answers_of_other_code_are_told(tmp_path):
+    several = tasks(Extent.QUICK)[:3]
+    kept = Kept(tmp_path / hidden_study.ANSWERS)
+    for task, code in zip(several, ("old", versions.code_of_loops(), None), strict=True):
+        kept.add(task.key, plain(row()) | ({hidden_study.CODE: code} if code else {}))
 
-    again = Kept(path)
-    assert "a" in again
-    assert "b" not in again
-    again.add("c", {"value": 3})
-
-    assert [r["value"] for r in Kept(path).rows.values()] == [1, 3]
+    assert hidden_study.which_code(tmp_path, several).startswith("2 of 3 answers are of other code")
+    assert "; " not in hidden_study.which_code(tmp_path, several[1:2])
 
 
 def test_a_study_of_right_answers_holds_its_claims():

@@ -146,7 +146,9 @@ def read_text(path_or_text: Path | str) -> tuple[str, Path | None]:
         beside = [p.name for p in path.parent.glob("*")] if path.parent.is_dir() else []
         near = nearest(path.name, beside)
         raise InputError(Message("there is no such file", nearest=near, file=str(path))) from None
-    except (OSError, UnicodeDecodeError) as error:
+    except OSError as error:
+        raise InputError(Message(f"cannot be read: {error.strerror}", file=str(path))) from None
+    except UnicodeDecodeError as error:
         raise InputError(Message(f"cannot be read: {error}", file=str(path))) from None
 
 

@@ -58,6 +58,7 @@ class AddTab:
         self._page = page
         self._ticks: Any = None
         self._names: list[str] = []
+        self._suggested = ""
 
     def build(self) -> Model:
         """Its widgets."""
@@ -104,7 +105,10 @@ class AddTab:
         plant = session.now.rig.plant
         self._other.options = [OTHER, *(n for n in plant.candidates if n not in self._names)]
         first = Path(session.steps[0].rig_file)
-        self._name.value = self._name.value or str(first.with_name(f"{first.stem}_better.toml"))
+        suggested = str(first.with_name(f"{first.stem}_better.toml"))
+        if self._name.value in ("", self._suggested):
+            self._name.value = suggested
+        self._suggested = suggested
         bars = waterfall(session.steps)
         self._fall.children = [_waterfall(bars)] if bars else []
         last = session.now.accepted

@@ -66,9 +66,6 @@ def linearise(
 ) -> Linearised:
     """Modes, how well they predict on the recordings, told at once, where, and their maps."""
     say("linearising")
-    if choice.cuts_file:
-        with whole_file(Path(choice.cuts_file)) as unfinished:
-            unfinished.write_text(choice.cuts, encoding="utf-8")
     hybrid = modes_of(rig, recordings, choice)
     error = _error(rig, hybrid, recordings, say)
     known = f"prediction error {number(100.0 * error, 3)} %; " if recordings else ""
@@ -85,8 +82,11 @@ def linearise(
 
 
 def modes_of(rig: Rig, recordings: Sequence[Recording], choice: ModeChoice) -> HybridModel:
-    """The modes of a choice; its file of cuts is there."""
+    """The modes of a choice; its cuts are written, as another browser tab may have its own."""
     cuts = Path(choice.cuts_file) if choice.cuts_file else None
+    if cuts:
+        with whole_file(cuts) as unfinished:
+            unfinished.write_text(choice.cuts, encoding="utf-8")
     placed_on = recordings if choice.placed is not None else ()
     return chosen_modes(rig, placed_on, choice.placed, choice.regimes, cuts)
 

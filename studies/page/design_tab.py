@@ -11,7 +11,7 @@ from studies.page.control_verbs import design_action, with_looped
 from studies.page.drawn import as_html
 from studies.page.look import BUTTON, button, column, guide, put, row, sharing, sheet, text, wide
 from studies.page.session import Session
-from studies.page.verbs import require_rig
+from studies.page.verbs import counted, require_rig
 from workbench.errors import InputError
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ class DesignTab:
         self._by_mode = ByMode(self._page)
         self._spec = TextAreaInput(
             title="Specification; the verdict follows as you type", rows=8, width=520,
-            name="specification",
+            name="specification", stylesheets=[sheet("textarea { padding-top: 6px; }")],
         )  # fmt: skip
         self._spec.on_change("value_input", lambda _a, _o, new: self._judge(new))
         self._verdict, self._loops = text(name="spec_verdict"), text()
@@ -114,7 +114,7 @@ class DesignTab:
             return
         rig, found = session.now.rig, session.looped
         try:
-            asked = read_specification(content, rig, [self._scenario.value])
+            asked = read_specification(_as_text(content), rig, [self._scenario.value])
         except (InputError, ValueError) as error:
             put(self._verdict, f'<p class="wrong" role="alert">{escape(str(error))}</p>')
             return
@@ -139,6 +139,8 @@ class DesignTab:
         page = self._page
         if not page.allows(require_rig):
             return
+        if not page.allows(lambda _: counted(self._runs.value, "plants")):
+            return
         session, method = page.session, self._method.value
         if not method:
             page.complain(f"{session.now.rig.plant.name} has no standard modes to control")
@@ -146,14 +148,20 @@ class DesignTab:
         first = Path(session.steps[0].rig_file)
         target = str(first.with_name(f"{first.stem}_{method}.toml"))
         observers = [self._observers.labels[k] for k in self._observers.active]
-        spec, observers = self._by_mode.with_choices(self._spec.value, observers)
-        chosen = (method, target, observers, [self._scenario.value], int(self._runs.value), spec)
+        spec, observers = self._by_mode.with_choices(_as_text(self._spec.value), observers)
+        runs = counted(self._runs.value, "plants")
+        chosen = (method, target, observers, [self._scenario.value], runs, spec)
         action = design_action(session, *chosen)
         page.work(
             action,
             lambda found: lambda now: with_looped(now, found, action),
             close_loops, session.now.rig, *chosen,
         )  # fmt: skip
+
+
+def _as_text(typed: str) -> str:
+    """A specification that no reader takes for the name of a file; empty as it is."""
+    return f"{typed}\n" if typed.strip() and not typed.endswith("\n") else typed
 
 
 def _piece(told: str) -> str:

@@ -137,6 +137,7 @@ def column(*children: Model) -> Column:
 
 def chart(x: str, y: str, height: int = 200, title: str = "", **more: Any) -> figure:
     """An empty chart in the common style, canvas drawn."""
+    from bokeh.models import FactorRange
     from bokeh.plotting import figure
 
     tools = more.pop("tools", "xpan,xwheel_zoom,reset")
@@ -155,7 +156,7 @@ def chart(x: str, y: str, height: int = 200, title: str = "", **more: Any) -> fi
         axis.major_label_text_font_size = "11px"
         axis.axis_line_color = SOFT
         axis.minor_tick_line_color = None
-    if height < SMALL:
+    if height < SMALL and not isinstance(more.get("y_range"), FactorRange):
         found.yaxis.ticker.desired_num_ticks = 3
     found.grid.grid_line_color = "#e8ebef"
     found.outline_line_color = None

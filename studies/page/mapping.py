@@ -12,8 +12,10 @@ from studies.page.look import button, column, row, text
 from studies.page.plausibility import column_names
 from studies.page.replay import NO_ACTION, Action
 from studies.page.session import TIME, Session, mapped, paths, with_opened, with_rig
+from studies.page.verbs import named, require_rig
 from workbench.errors import InputError, whole_file
 from workbench.recording_format import channel_names
+from workbench.rig import load_rig
 from workbench.units import display_unit
 
 if TYPE_CHECKING:
@@ -53,6 +55,8 @@ class Mapping:
         )
 
     def _fold(self) -> None:
+        if not self._inner.visible and not self._page.allows(require_rig):
+            return
         self._inner.visible = not self._inner.visible
         self._fill()
 
@@ -98,6 +102,7 @@ class Mapping:
         self._lines.children = lines
 
     def _apply(self) -> None:
+        """The rig with these columns, once the open recordings can be read by it."""
         page, target = self._page, self._name.value.strip()
         chosen = {
             full: (select.value, unit.value.strip())
@@ -105,9 +110,14 @@ class Mapping:
             if select.value != ABSENT
         }
 
+        contents: list[str] = []
+        if not page.allows(lambda session: contents.append(mapped(session.now.rig, chosen))):
+            return
+        (content,) = contents
+
         def change(session: Session) -> Session:
-            content = mapped(session.now.rig, chosen)
-            with whole_file(Path(target)) as unfinished:
+            path = Path(named(target, "rig file", "columns.toml"))
+            with whole_file(path) as unfinished:
                 unfinished.write_text(content, encoding="utf-8")
             lines = f"from pathlib import Path\nPath({target!r}).write_text({content!r})\n"
             found = with_rig(session, target)
@@ -115,16 +125,18 @@ class Mapping:
             return replace(found, actions=(*found.actions[:-1], Action("", lines + last.python)))
 
         before = page.session.files
-        if page.attempt(change) and before:
-            roles = {each.opened.path: each.role for each in before}
+        if not before:
+            page.attempt(change)
+            return
 
-            def reread(found: tuple[tasks.Opened, ...]) -> Any:
-                def with_all(session: Session) -> Session:
-                    for each in found:
-                        session = with_opened(session, [each], roles[each.path])
-                    return session
+        def reread(read: tuple[tasks.Opened, ...]) -> Any:
+            def with_all(session: Session) -> Session:
+                session = change(session)
+                for each, file in zip(read, before, strict=True):
+                    session = with_opened(session, [each], file.role)
+                return session
 
-                return with_all
+            return with_all
 
-            every = tuple(paths([each.opened for each in before]))
-            page.work(NO_ACTION, reread, tasks.open_recordings, page.session.now.rig, every)
+        every = tuple(paths([each.opened for each in before]))
+        page.work(NO_ACTION, reread, tasks.open_recordings, load_rig(content), every)

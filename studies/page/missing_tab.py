@@ -10,7 +10,17 @@ import numpy as np
 
 from studies.figures.style import BLUE, ORANGE
 from studies.page import tasks
-from studies.page.look import button, chart, column, guide, html_table, put, row, text
+from studies.page.look import (
+    NARROWEST,
+    button,
+    chart,
+    column,
+    guide,
+    html_table,
+    put,
+    row,
+    text,
+)
 from studies.page.missing_term import MissingTerm
 from studies.page.session import Role, Session, recordings
 from studies.page.verbs import diagnose_action, require_train, with_diagnosed, with_saved_commands
@@ -128,6 +138,7 @@ def _bars(rows: tuple[Ranked, ...]) -> Any:
             hatch_color="white",
         )  # fmt: skip
     found.min_border_left = 24 + LETTER * max(map(len, names))
+    found.min_width = found.min_border_left + NARROWEST  # a name cut once leaves a stripe
     found.legend.location, found.legend.label_text_font_size = "bottom_right", "11px"
     found.yaxis.major_label_text_font_size = "12px"
     found.ygrid.grid_line_color = None

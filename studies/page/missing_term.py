@@ -122,7 +122,7 @@ def _dependence(each: Dependence, factor: float, unit: str) -> Any:
     centres, means, spreads = each.bins * np.array([[per], [factor], [factor]])
     shown = labelled(plain)
     label = f"rate of {shown[:-1]}/s)" if rated else shown
-    title = f"follows {public_name(plain).replace('_', ' ')}: {percent(each.explains)}"
+    title = f"follows {_words(plain)}: {percent(each.explains)}"
     found = chart(label, f"missing ({unit})", HEIGHT, title, tools="")
     found.varea(centres, means - spreads, means + spreads, color=BLUE, alpha=0.25)
     found.line(centres, means, color=BLUE, line_width=1.5)

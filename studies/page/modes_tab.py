@@ -9,7 +9,7 @@ from studies.page.control_verbs import modes_action, with_linearised
 from studies.page.drawn import as_html
 from studies.page.look import button, column, guide, put, row, text, wide
 from studies.page.session import Role, Session, recordings
-from studies.page.verbs import require_rig
+from studies.page.verbs import counted, require_rig
 from studies.text import number
 from workbench.units import display_scale, display_unit, public_name
 
@@ -107,9 +107,13 @@ class ModesTab:
 
     def _linearise(self) -> None:
         kind = self._kind.value
-        placed = int(self._number.value) if kind == PLACED else None
         from studies.page.control_tasks import ModeChoice
 
+        placed, number = None, self._number.value
+        if kind == PLACED:
+            if not self._page.allows(lambda _: counted(number, "modes")):
+                return
+            placed = counted(number, "modes")
         self._start(ModeChoice(kind == REGIMES, placed))
 
     def _by_hand(self) -> None:
@@ -118,13 +122,23 @@ class ModesTab:
 
     def _move(self) -> None:
         """The modes with the boundaries where the sliders are; those under way are not wanted."""
+        from studies.page.control_tasks import linearise
         from studies.page.mode_cuts import moved
 
-        self._page.cancel()
+        page = self._page
         changes = [
             (each, display_scale(each.signal).to_si(slider.value)) for each, slider in self._sliders
         ]
-        self._cut(moved(dict(self._page.session.linearised.cuts), changes))
+        page.supersede(linearise)
+        if page.allows(require_rig):
+            self._cut(moved(dict(page.session.linearised.cuts), changes))
+        else:
+            self._back()
+
+    def _back(self) -> None:
+        """The sliders where the boundaries are."""
+        if self._page.session.linearised:
+            self._cuts.children = [*self._movable(self._page.session.linearised)]
 
     def _cut(self, cuts: dict[str, tuple[Interval, ...]]) -> None:
         from studies.page.control_tasks import ModeChoice
@@ -149,4 +163,5 @@ class ModesTab:
             lambda found: lambda now: with_linearised(now, found, action),
             linearise, session.now.rig,
             recordings(session.of(Role.TRAINING)), choice,
+            otherwise=self._back,
         )  # fmt: skip

@@ -32,7 +32,7 @@ from studies.page.session import (
     without_file,
 )
 from studies.page.traces import TIME, Traces
-from studies.page.verbs import require_rig, require_train, with_checked
+from studies.page.verbs import named, require_rig, require_train, with_checked
 from studies.text import labelled
 from workbench.plants import PLANTS
 from workbench.units import display_scale
@@ -144,7 +144,7 @@ class RecordingTab:
 
     def _open_rig(self) -> None:
         path = self._rig.value.strip()
-        self._page.attempt(lambda session: with_rig(session, path))
+        self._page.attempt(lambda session: with_rig(session, named(path, "rig file", "rig.toml")))
 
     def _picked(self, _attr: str, _old: str, new: str) -> None:
         if new != NONE:
@@ -155,6 +155,8 @@ class RecordingTab:
     def _add(self) -> None:
         path, page = self._file.value.strip(), self._page
         if not page.allows(require_rig):
+            return
+        if not page.allows(lambda _: named(path, "recording", "train.csv")):
             return
         page.work(
             NO_ACTION,

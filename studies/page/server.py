@@ -10,6 +10,7 @@ from __future__ import annotations
 import secrets
 import signal
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -29,7 +30,7 @@ from tornado.ioloop import IOLoop
 from tornado.web import RequestHandler
 
 from studies.page import tasks
-from studies.page.jobs import Job, end_all
+from studies.page.jobs import STOPPED, Job, Told, end_all
 from studies.page.pages import all_tabs
 from studies.page.session import Session, with_opened, with_rig
 from studies.page.template import TEMPLATE
@@ -147,12 +148,19 @@ class PageServer:
 
 
 class _Shared:
-    """A job that several browser tabs look at; none of them cancels it for the others."""
+    """A job that several browser tabs look at; a cancel ends it for one of them alone."""
 
     def __init__(self, job: Job) -> None:
-        self._job = job
-        self.look = job.look
-        self.cancel = lambda: None
+        self._job, self._left = job, False
+
+    def look(self) -> Told:
+        """What it has said until now."""
+        told = self._job.look()
+        return replace(told, ended=True, refused=STOPPED) if self._left and not told.ended else told
+
+    def cancel(self) -> None:
+        """Look no longer."""
+        self._left = True
 
     @property
     def elapsed_s(self) -> float:

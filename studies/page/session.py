@@ -158,6 +158,8 @@ def without_file(session: Session, path: str) -> Session:
 
 def _with_files(session: Session, files: tuple[File, ...]) -> Session:
     found = replace(session, files=files, checked=None, compared=None, diagnosed=None)
+    if found.of(Role.TRAINING) != session.of(Role.TRAINING):  # their error, and where modes lie
+        found = replace(found, linearised=None, linearised_before=None)
     train, validation = (paths(found.of(r)) for r in (Role.TRAINING, Role.VALIDATION))
     return did(found, Action("", recordings_lines(train, validation)))
 

@@ -56,6 +56,32 @@ def require_rig(session: Session) -> None:
     _ = session.now
 
 
+def named(path: str, what: str, example: str) -> str:
+    """A path that was typed.
+
+    Raises
+    ------
+    InputError
+        If nothing was.
+    """
+    if not path:
+        raise InputError(Message("has no name", what, f"a name such as {example}"))
+    return path
+
+
+def counted(typed: float | None, what: str) -> int:
+    """A number that was typed.
+
+    Raises
+    ------
+    InputError
+        If it is not a whole one from 1 on.
+    """
+    if typed is None or typed < 1 or typed != int(typed):
+        raise InputError(Message("is no number of them", what, "a whole number from 1 on"))
+    return int(typed)
+
+
 def with_checked(session: Session, found: tuple[Finding, ...]) -> Session:
     """What the gate found; it changes nothing, so it is no action."""
     return replace(session, checked=found)
@@ -189,9 +215,8 @@ def save(session: Session, path: str) -> Session:
     """
     from studies.command_line.files import writable
 
-    if not path.strip():
-        raise InputError(Message("has no name", "rig file", "a name such as better.toml"))
-    target = Path(path.strip())
+    require_rig(session)
+    target = Path(named(path.strip(), "rig file", "better.toml"))
     writable(target)
     write_rig(session.now.rig, target)
     load_rig(target)  # what was written reads back

@@ -8,7 +8,7 @@ from pathlib import Path
 from time import strftime
 from typing import TYPE_CHECKING, Any, Protocol
 
-from studies.page.jobs import Job
+from studies.page.jobs import Job, Told
 from studies.page.look import CHOICE, button, column, put, row, sheet, text
 from studies.page.replay import Action, write_script
 from studies.page.session import Session
@@ -21,7 +21,13 @@ if TYPE_CHECKING:
 POLL_MS = 200
 SHOWN = 240  # letters of a line of Python
 BUSY = "something is running: wait for it, or cancel it"
-COPY = "navigator.clipboard.writeText(said.text)"
+BUSY_S = 4.0  # as long as that is said beside the progress
+COPY = """
+const told = (word) => { pressed.label = word; setTimeout(() => { pressed.label = label }, 1500) }
+if (!said.text) { told("Nothing to copy") } else {
+    navigator.clipboard.writeText(said.text).then(() => told("Copied"), () => told("Refused"))
+}
+"""
 
 Change = Callable[[Session], Session]
 
@@ -52,6 +58,8 @@ class Page:
         self._then: Callable[[Any], Change] = lambda _: lambda session: session
         self._otherwise: Callable[[], None] = lambda: None
         self._polling: Any = None
+        self._task: Callable[..., Any] | None = None
+        self._busy_until_s = 0.0
         self._replay = Path(f"workbench_replay_{strftime('%Y%m%d_%H%M%S')}_{id(self) % 9973}.py")
         self._build()
         document.on_session_destroyed(self._closed)
@@ -78,7 +86,8 @@ class Page:
             for label, name in (("Copy as command", "copy_command"), ("Copy as Python", "copy_py"))
         ]
         for each, said in zip(copies, (self._command, self._python), strict=True):
-            each.js_on_click(CustomJS(args={"said": said}, code=COPY))
+            known = {"said": said, "pressed": each, "label": each.label}
+            each.js_on_click(CustomJS(args=known, code=COPY))
         whole = column(
             self._head,
             self._choice,
@@ -110,8 +119,7 @@ class Page:
 
     def attempt(self, change: Change) -> bool:
         """Another session, or what stands against it in words."""
-        if self._job is not None:
-            self.complain(BUSY)
+        if self._occupied():
             return False
         try:
             self.become(change(self.session))
@@ -143,18 +151,19 @@ class Page:
         ``then`` makes a change of the session from its result; ``otherwise`` is called where it
         has none, as after a cancel.
         """
-        if self._job is not None:
-            self.complain(BUSY)
+        if self._occupied():
             return
         if action.command:
             self.tell(action)
         self.follow(Job(task, *arguments), then, otherwise)
+        self._task = task
 
     def follow(
         self, job: Job, then: Callable[[Any], Change], otherwise: Callable[[], None] = lambda: None
     ) -> None:
         """Show a job while it runs."""
         self._job, self._then, self._otherwise = job, then, otherwise
+        self._task, self._busy_until_s = None, 0.0
         self._cancel.visible = True
         self._polling = self.document.add_periodic_callback(self._poll, POLL_MS)
         self._poll()
@@ -165,10 +174,7 @@ class Page:
             return
         told = job.look()
         if not told.ended:
-            last = told.progress[-1] if told.progress else "starting"
-            self._status.text = f'<p class="busy" role="status">{escape(last)} &middot; ' + (
-                f"{job.elapsed_s:.0f} s</p>"
-            )
+            self._show_progress(told, job.elapsed_s)
             return
         then, self._job = self._then, None
         self._stop_polling()
@@ -178,6 +184,14 @@ class Page:
         elif self.attempt(then(told.result)) and told.warned:
             said = "\n".join(dict.fromkeys(told.warned))
             self._status.text = f'<p class="warned" role="status">{escape(said)}</p>'
+
+    def _show_progress(self, told: Told, elapsed_s: float) -> None:
+        """What a job said last; for a while after a click in vain, that it runs."""
+        last = told.progress[-1] if told.progress else "starting"
+        said = f'<p class="busy" role="status">{escape(last)} &middot; {elapsed_s:.0f} s</p>'
+        if elapsed_s < self._busy_until_s:
+            said += f'<p class="wrong" role="alert">{BUSY}</p>'
+        self._status.text = said
 
     def _stop_polling(self) -> None:
         self._cancel.visible = False
@@ -190,6 +204,21 @@ class Page:
         if self._job is not None:
             self._job.cancel()
             self._poll()
+
+    def supersede(self, task: Callable[..., Any]) -> None:
+        """End the running job where it does this very task: another answer of it is wanted."""
+        if self._job is not None and self._task is task:
+            self._otherwise = lambda: None
+            self.cancel()
+
+    def _occupied(self) -> bool:
+        """True where something runs; that is said, and stays for a while beside its progress."""
+        job = self._job
+        if job is None:
+            return False
+        self._busy_until_s = job.elapsed_s + BUSY_S
+        self._show_progress(job.look(), job.elapsed_s)
+        return True
 
     def _closed(self, _: Any) -> None:
         """The browser is gone: its job has nobody to work for."""

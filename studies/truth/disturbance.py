@@ -46,7 +46,11 @@ def disturbed(
     force_n = b.drive.constant_force_n + by.force_n[sample]
     pushed = replace(b, drive=replace(b.drive, constant_force_n=force_n))
     half_kg = 0.5 * SAMPLE_TIME_S * by.flow_kg_s[sample]
-    return _filled(b, advance(pushed, _filled(b, state, half_kg), command_v), half_kg)
+    moved = advance(pushed, _filled(b, state, half_kg), command_v)
+    filled = _filled(b, moved, half_kg)
+    gained_pa = filled.pressure_pa - moved.pressure_pa
+    # A sensor sees it too, all of it at once where it has no lag.
+    return replace(filled, read_pa=moved.read_pa + b.constant.read_weight[-1] * gained_pa)
 
 
 def _filled(b: Bench, state: d.State, mass_kg: np.ndarray) -> d.State:

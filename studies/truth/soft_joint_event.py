@@ -30,7 +30,7 @@ from studies.truth.soft_joint_record import (
 HIDDEN = "valve_stuck_band"
 STUCK_SHARE = 0.03
 EVENT_COMMAND, EVENT_S, FILL_S = 0.478, 5.0, 3.0
-SHORTEST_S = 20.0  # of a record
+SHORTEST_S = 25.0  # of a record: the event and what comes before it have room
 QUICK_PART, EVENT_PART = (0.45, 0.62), 0.78  # shares of the record
 
 

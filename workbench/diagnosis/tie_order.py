@@ -5,14 +5,16 @@ missing effect was large these count windows least that show it best, and rivals
 errors differ by half seem to do the same.  Once each has been settled (see
 :mod:`workbench.diagnosis.settle`) its errors are its own, and for errors of unknown size
 
-    -2 log L = sum over recordings and outputs of n log(mean square error) + price of the priors
+    -2 log L = sum over recordings of n sum over outputs of log(mean square error) + price of priors
 
-with n the recorded values over their correlation time, those of the first in the ranking for all.
-It orders a tie and decides which three of a crowd are printed; what is tied stays tied, since the
-small errors that every model has weigh as much as the difference between two such rivals.
+with n the recorded values of an output over their correlation time, the mean of all outputs and
+those of the first in the ranking for all: outputs err with the same motion, and one that repeats
+its error longer tells no less of it.  It orders a tie and decides which three of a crowd are
+printed; what is tied stays tied, since the small errors that every model has weigh as much as the
+difference between two such rivals.
 
-Source: Seber and Wild 1989, "Nonlinear regression", 2.2 (likelihood with the variance profiled
-out); diagnosis.md 1.6.
+Source: Box and Draper 1965, "The Bayesian estimation of common parameters from several responses"
+(their determinant, here of a diagonal covariance); diagnosis.md 1.6.
 """
 
 from __future__ import annotations
@@ -52,13 +54,13 @@ def surprise(row: Ranked, leader: Ranked) -> float:
 
 
 def _of_errors(fit: Fit, first: Fit) -> float:
-    """Sum over outputs of n log(mean square error), which is never below the noise."""
+    """Effective samples times the sum of log(mean square error), never below the noise."""
     windows = fit.windows
     recorded = (windows.weight > 0).sum(axis=2)
     squares = ((fit.residual * windows.scale[:, :, None]) ** 2).sum(axis=(1, 2))
     mean = np.maximum(squares / np.maximum(recorded.sum(axis=1), 1), windows.noise**2)
     counted = ((first.windows.weight > 0).sum(axis=2) / first.windows.correlation).sum(axis=1)
-    return float(np.sum(counted * np.log(mean)))
+    return float(np.mean(counted) * np.sum(np.log(mean)))
 
 
 def _regrouped(group: list[Ranked]) -> list[Ranked]:
