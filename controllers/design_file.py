@@ -18,6 +18,18 @@ import numpy as np
 from controllers import CONTROLLERS
 from controllers.spec import replaced
 from linearize.modes import HybridModel
+from linearize.standard import (
+    AXIS_MODES,
+    JOINT_MODES,
+    SHIFT_MODES,
+    SLIDE_MODES,
+    VESSEL_MODES,
+    axis_modes,
+    leg_joint_modes,
+    shift_modes,
+    slide_modes,
+    vessel_modes,
+)
 from workbench.contracts import Controller
 from workbench.errors import Message, UnknownNameError, listed, nearest, whole_file
 from workbench.plant import Plant
@@ -25,6 +37,15 @@ from workbench.plant_files import as_it_came, plant_named, plant_text
 from workbench.rig_laws import laws_of, with_laws
 from workbench.rig_text import quoted
 from workbench.units import suffix
+
+PLANTS = {
+    slide_modes: SLIDE_MODES,
+    axis_modes: AXIS_MODES,
+    leg_joint_modes: JOINT_MODES,
+    shift_modes: SHIFT_MODES,
+    vessel_modes: VESSEL_MODES,
+}
+"""The plants for which there are such modes."""
 
 
 @dataclass(frozen=True)
@@ -59,8 +80,24 @@ def design(method: str, plant: Plant, numbers: Mapping[str, Any] | None = None) 
         raise UnknownNameError(Message(what, nearest=nearest(method, CONTROLLERS)))
     found = CONTROLLERS[method]
     spec = replaced(found.spec(), numbers or {}, method)
-    hybrid = found.modes(plant)
+    try:
+        hybrid = found.modes(plant)
+    except UnknownNameError as error:
+        raise UnknownNameError(f"{error}; {_offered(plant)}") from error
     return Design(method, plant, spec, hybrid, found.design(hybrid, spec))
+
+
+def methods_of(plant: Plant) -> list[str]:
+    """The controllers that are for a plant."""
+    return [name for name, each in CONTROLLERS.items() if plant.name in PLANTS[each.modes]]
+
+
+def _offered(plant: Plant) -> str:
+    """The controllers that there are for a plant, or the plants for which there is one."""
+    if methods := methods_of(plant):
+        return f"controllers for {plant.name}: {listed(methods)}"
+    plants = dict.fromkeys(name for each in PLANTS.values() for name in each)
+    return f"no controller is for {plant.name}, only for {listed(plants)}"
 
 
 def write_design(found: Design, path: Path) -> None:

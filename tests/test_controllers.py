@@ -11,7 +11,9 @@ from linearize.standard import standard_modes
 from workbench.contracts import Estimate
 from workbench.effects import DeadZone, ValveOffset
 from workbench.errors import InputError
+from workbench.plants.gearbox import gearbox
 from workbench.plants.servo_drive import COMMAND, servo_drive
+from workbench.plants.vertical_cylinder import vertical_cylinder
 
 everyone = pytest.mark.parametrize("name", SLIDE_CONTROLLERS)
 REST = np.array([0.145, 0.0, 5.65e5, 5.65e5])
@@ -174,3 +176,16 @@ def test_an_offset_of_the_valve_shifts_its_closed_command():
 
     assert found.shut == pytest.approx([5.15])
     assert arrived == pytest.approx(4.95 + 0.5, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("plant", "offered"),
+    [
+        (vertical_cylinder(), "no controller is for vertical_cylinder, only for servo_drive, crr"),
+        (gearbox(), "controllers for gearbox: hybrid-mpc"),
+    ],
+    ids=lambda value: getattr(value, "name", ""),
+)
+def test_a_method_that_is_not_for_a_plant_is_refused_with_what_there_is_for_it(plant, offered):
+    with pytest.raises(InputError, match=f"position a slide with for {plant.name}; .*{offered}"):
+        design("pid", plant)

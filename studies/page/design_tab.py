@@ -80,8 +80,9 @@ class DesignTab:
 
     def _offer(self, session: Session) -> None:
         """What is there for the plant, once it is another one."""
+        from controllers.design_file import methods_of
         from studies.checking import scenarios_of
-        from studies.page.offers import methods_of, observers_of, usual_spec
+        from studies.page.offers import observers_of, usual_spec
 
         plant = session.now.rig.plant
         if plant.name == self._plant:

@@ -5,23 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from controllers import CONTROLLERS
 from controllers.margins import Margins, margins_of, unforeseen_s
 from controllers.per_mode import Method, PerModeSpec, per_mode
 from controllers.scheduled import driven_modes
 from estimators import ESTIMATORS
-from linearize.standard import (
-    AXIS_MODES,
-    JOINT_MODES,
-    SHIFT_MODES,
-    SLIDE_MODES,
-    VESSEL_MODES,
-    axis_modes,
-    leg_joint_modes,
-    shift_modes,
-    slide_modes,
-    vessel_modes,
-)
+from linearize.standard import SHIFT_MODES, SLIDE_MODES, slide_modes
 from studies.following import BENCHES
 from studies.following_check import RAW
 from workbench.plant import Plant
@@ -30,13 +18,6 @@ from workbench.rig_text import quoted
 
 PER_MODE = "per-mode"
 AT_REST = "stick"  # in the names of modes
-PLANTS = {
-    slide_modes: SLIDE_MODES,
-    axis_modes: AXIS_MODES,
-    leg_joint_modes: JOINT_MODES,
-    shift_modes: SHIFT_MODES,
-    vessel_modes: VESSEL_MODES,
-}
 SPEC = """\
 rise_time   = "150 ms"
 overshoot   = "2 %"
@@ -56,11 +37,6 @@ class Offers:
     def modes(self) -> tuple[str, ...]:
         """The names of these modes, forward then backward."""
         return tuple(self.margins)
-
-
-def methods_of(plant: Plant) -> list[str]:
-    """The controllers that are for a plant."""
-    return [name for name, each in CONTROLLERS.items() if plant.name in PLANTS[each.modes]]
 
 
 def observers_of(plant: Plant) -> list[str]:
