@@ -42,7 +42,7 @@ def confusion_figure(title: str, answers: Sequence[tuple[str, str, bool]]) -> Fi
         axes.grid(False)
         axes.set_xlabel("first in the ranking")
         axes.set_ylabel("hidden")
-        axes.set_title(f"{title}: {len(answers)} recordings, crossed where the answer was wrong")
+        axes.set_title(f"{title}: {len(answers)} answers, crossed where wrong")
     return figure
 
 
