@@ -168,7 +168,10 @@ def test_a_browser_that_closes_in_the_middle_of_a_fit_leaves_the_server_well(ser
     idle = len(page_of.children())
     click(page, "3 Missing effect")
     click(page, "Diagnose")
-    page.wait_for_selector("text=prior fit")
+    for _ in range(300):
+        if len(page_of.children()) > idle:
+            break
+        page.wait_for_timeout(100)
     assert len(page_of.children()) > idle
     page.close()
 
