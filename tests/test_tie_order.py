@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from test_judgement import named
 from test_ties import followed, problem, sound  # noqa: F401  (fixtures)
@@ -17,11 +18,11 @@ def crowd(problem, followed, sound):  # noqa: F811
     return ranked(problem, followed.profiles, [sound, *alike], [], {})
 
 
-def with_errors(row, factor):
-    """A row whose fit leaves so many times the errors."""
-    at = row.fit.derivatives
-    fit = replace(row.fit, derivatives=replace(at, residual=factor * at.residual))
-    return replace(row, fit=fit)
+def with_errors(row, factor, of="validation"):
+    """A row whose fit leaves so many times the errors, held out or in training."""
+    fit = getattr(row, of)
+    at = replace(fit.derivatives, residual=factor * fit.derivatives.residual)
+    return replace(row, **{of: replace(fit, derivatives=at)})
 
 
 def names_of(rows):
@@ -43,17 +44,18 @@ def test_the_one_with_the_smallest_errors_leads_and_the_first_three_are_printed(
     assert names_of(found[4:]) == names_of(crowd[4:])
 
 
-def test_errors_alike_are_decided_by_what_the_parameters_had_to_move(crowd):
-    dearer = replace(crowd[0], fit=replace(crowd[0].fit, cost=crowd[0].fit.cost + 1.0))
-    assert surprise(dearer, dearer) == pytest.approx(surprise(crowd[0], crowd[0]) + 1.0)
-    assert names_of(likeliest_first((dearer, *crowd[1:])))[3] == dearer.candidate.name
+def test_training_errors_do_not_count(crowd):
+    rows = [with_errors(row, 1.0 / (k + 1.0), "fit") for k, row in enumerate(crowd[:4])]
+    assert names_of(likeliest_first((*rows, *crowd[4:]))) == names_of(crowd)
 
 
-def test_held_out_errors_count_too(crowd):
-    at = crowd[0].validation.derivatives
-    held_out = replace(crowd[0].validation, derivatives=replace(at, residual=2.0 * at.residual))
-    worse = replace(crowd[0], validation=held_out)
-    assert names_of(likeliest_first((worse, *crowd[1:])))[3] == worse.candidate.name
+def test_errors_of_all_outputs_count_in_effective_samples(crowd):
+    row = crowd[0]
+    windows = row.validation.windows
+    effective = ((windows.weight > 0) / windows.correlation[:, :, None]).sum(axis=(1, 2)).mean()
+    outputs = windows.weight.shape[0]
+    added = surprise(with_errors(row, 100.0), row) - surprise(with_errors(row, 10.0), row)
+    assert added == pytest.approx(effective * outputs * np.log(100.0), rel=1e-6)
 
 
 def test_what_fails_a_criterion_stays_behind_however_small_its_errors(crowd):
@@ -67,3 +69,5 @@ def test_one_alone_and_what_was_not_refitted_stay_as_they_are(crowd):
     assert likeliest_first(alone) == alone
     unfitted = (crowd[0], replace(crowd[1], fit=None, validation=None), *crowd[2:])
     assert likeliest_first(unfitted) == unfitted
+    with pytest.raises(ValueError, match="held out"):
+        surprise(unfitted[1], crowd[0])
