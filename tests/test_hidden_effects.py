@@ -127,6 +127,15 @@ def test_an_effect_that_keeps_little_on_what_is_held_out_bars_no_law():
     assert found.diagnosis.law.balance == "chamber_a.mass"
 
 
+@pytest.mark.slow
+def test_a_crowd_bars_no_law():
+    """A cable that sags is a constant force to the sensors and the friction, but for its curve."""
+    found = diagnosed("sagging_cable", ("sagging_cable",))
+
+    assert found.diagnosis.verdict is Verdict.NOT_IN_CATALOGUE, said([found])
+    assert found.diagnosis.law.balance == "slide.momentum"
+
+
 def test_the_user_s_rig_lacks_what_is_hidden():
     rig = SERVO_DRIVE.user_rig(CASES["coulomb_friction", SEED])
 

@@ -252,11 +252,12 @@ def _law(
     A parameter that leaves its prior is no such effect: it may well imitate the law.  So the law
     is to leave a fifth less than the best effect, and only less than the best shift; what fails
     another criterion than its share is no rival.  The scan of an effect that keeps little of its
-    drop on what is held out bars no law.
+    drop on what is held out bars no law, and neither does a share that a whole crowd removes: a
+    sagging cable is a force to four sensors, and its curve is what they leave.
     """
     leader = ranking[0] if ranking else None
     certain = leader and leader.accepted and leader.kind is Kind.EFFECT
-    if leader and certain and share_removed(leader) >= CERTAIN_SHARE:
+    if leader and certain and not leader.crowd and share_removed(leader) >= CERTAIN_SHARE:
         return None
     progress("empirical law")
     keeps = certain and not leader.drop_validation < KEEPS * leader.drop_train
