@@ -10,8 +10,6 @@ errors differ by half seem to do the same.  Once each has been settled (see
 on the recordings held out, with n their recorded values over their correlation time, those of the
 first in the ranking for all.  Training errors do not count: nominal parameters moved to make them
 small, those of a wrong effect further than those of the right one, and there are many more of them.
-Of 32 ties of ``hidden-effects`` the hidden effect leads 23 in this order, 20 with the training
-errors and the price of the priors added, 20 in the order of the drops (studies/README.md).
 
 It orders a tie and decides which three of a crowd are printed; what is tied stays tied, since the
 small errors that every model has weigh as much as the difference between two such rivals.
