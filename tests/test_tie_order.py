@@ -44,9 +44,11 @@ def test_the_one_with_the_smallest_errors_leads_and_the_first_three_are_printed(
     assert names_of(found[4:]) == names_of(crowd[4:])
 
 
-def test_training_errors_do_not_count(crowd):
-    rows = [with_errors(row, 1.0 / (k + 1.0), "fit") for k, row in enumerate(crowd[:4])]
-    assert names_of(likeliest_first((*rows, *crowd[4:]))) == names_of(crowd)
+def test_training_errors_count_as_if_they_were_as_many_as_those_held_out(crowd):
+    row = crowd[0]
+    trained, held_out = (with_errors(row, 3.0, of) for of in ("fit", "validation"))
+    assert surprise(trained, row) == pytest.approx(surprise(held_out, row), rel=1e-9)
+    assert surprise(trained, row) > surprise(row, row)
 
 
 def test_errors_of_all_outputs_count_in_effective_samples(crowd):

@@ -1,15 +1,17 @@
-"""Which of those that do the same to a recording comes first: the one that predicts best.
+"""Which of those that do the same to a recording comes first: the one with the likeliest errors.
 
 The drops of a ranking share weights from the errors of the model without any of them.  Where the
 missing effect was large these count windows least that show it best, and rivals whose remaining
 errors differ by half seem to do the same.  Once each has been settled (see
 :mod:`workbench.diagnosis.settle`) its errors are its own, and for errors of unknown size
 
-    -2 log L = n sum over outputs of log(mean square error)
+    -2 log L = n sum over outputs of log(mean square error), trained + held out
 
-on the recordings held out, with n their recorded values over their correlation time, those of the
-first in the ranking for all.  Training errors do not count: nominal parameters moved to make them
-small, those of a wrong effect further than those of the right one, and there are many more of them.
+with n the recorded values held out over their correlation time, those of the first in the ranking.
+Training errors count as if they were as many: they are usually more, but nominal parameters moved
+to make them small, those of a wrong effect further than those of the right one.  By what is held
+out alone a real seal's dry friction would be one that grows with the pressure, which leaves as
+little there and more than half as much again in training.
 
 It orders a tie and decides which three of a crowd are printed; what is tied stays tied, since the
 small errors that every model has weigh as much as the difference between two such rivals.
@@ -27,6 +29,7 @@ import numpy as np
 from workbench.diagnosis.judge import LARGEST_TIE
 from workbench.diagnosis.result import Ranked
 from workbench.effect import Kind
+from workbench.fitting.gauss_newton import Fit
 
 
 def likeliest_first(ranking: tuple[Ranked, ...]) -> tuple[Ranked, ...]:
@@ -54,14 +57,20 @@ def surprise(row: Ranked, leader: Ranked) -> float:
     ValueError
         If one of them was not validated.
     """
-    if row.validation is None or leader.validation is None:
+    if row.fit is None or row.validation is None or leader.validation is None:
         raise ValueError("the order of a tie needs what each leaves of the recordings held out")
-    windows, first = row.validation.windows, leader.validation.windows
-    recorded = (windows.weight > 0).sum(axis=(1, 2))
-    squares = ((row.validation.residual * windows.scale[:, :, None]) ** 2).sum(axis=(1, 2))
-    mean = np.maximum(squares / np.maximum(recorded, 1), windows.noise**2)
+    first = leader.validation.windows
     counted = ((first.weight > 0).sum(axis=2) / first.correlation).sum(axis=1)
-    return float(np.mean(counted) * np.sum(np.log(mean)))
+    logs = [np.sum(np.log(_mean_squares(fit))) for fit in (row.fit, row.validation)]
+    return float(np.mean(counted) * sum(logs))
+
+
+def _mean_squares(fit: Fit) -> np.ndarray:
+    """Mean square error of each output, shape (outputs,), never below its noise."""
+    windows = fit.windows
+    recorded = (windows.weight > 0).sum(axis=(1, 2))
+    squares = ((fit.residual * windows.scale[:, :, None]) ** 2).sum(axis=(1, 2))
+    return np.maximum(squares / np.maximum(recorded, 1), windows.noise**2)
 
 
 def _regrouped(group: list[Ranked]) -> list[Ranked]:
