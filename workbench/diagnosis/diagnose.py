@@ -37,7 +37,6 @@ from workbench.diagnosis.rough import rough_fit
 from workbench.diagnosis.scan import Profile, scan_catalogue, scan_from_priors
 from workbench.diagnosis.settle import with_settled_sizes
 from workbench.diagnosis.shifts import Shift, shifts
-from workbench.diagnosis.tie_order import likeliest_first
 from workbench.diagnosis.verdict import far_above_noise, judged, sentence, unexplained, unsteady
 from workbench.diagnosis.where import acts_in, locate
 from workbench.effect import Kind
@@ -115,7 +114,7 @@ def diagnose(
     verdict = judged(ranking, law, evidence.strong, far)
     if verdict in NAMING or (ranking and ranking[0].accepted):
         progress("sizes of what is named")
-        ranking = likeliest_first(with_settled_sizes(problem, ranking))
+        ranking = with_settled_sizes(problem, ranking)
     best = ranking[0] if verdict in NAMING else None
     if best and best.fit and not best.fit.converged:
         warnings += (f"the refit with {best.candidate.name} did not converge: its size may be off",)
