@@ -1,7 +1,8 @@
 """Study ``gear-shifts``: which design shifts the gearbox fast and softly, and on how many plants.
 
 Designs side by side at the plant's own supply; hybrid MPC with the same numbers at 7 to 10 bar; and
-hybrid MPC on plants drawn from their uncertainty, which design and filter do not know.
+hybrid MPC on plants drawn from their uncertainty: as delivered, where design and filter know
+nothing of the draw; after commissioning, by a fit to one recording of the drawn plant; and known.
 
 Source: paper 003 and its follow-up, Appl. Sci. 2020, 10(10), 3514, which ranks scheduled designs
 above LQ and LQ above PD; physics.md 7, case 4.
@@ -19,6 +20,8 @@ from controllers.design_file import design
 from controllers.switched_feedback import averaged, switched_lq, switched_pd
 from linearize.standard import shift_modes
 from studies.checking import apart, drawn, styled_figures
+from studies.commissioning import claims as claims_after
+from studies.commissioning import commissioned, reached_table
 from studies.kept import Kept, Row
 from studies.shift_check import SHIFTS, Shift, ShiftCheck, check_shifts, shift_table
 from studies.study import Claim, Extent, Outcome, Study
@@ -45,20 +48,26 @@ def run(folder: Path, extent: Extent, say: Callable[[str], None]) -> Outcome:
         say(f"supply of {1e-5 * supply_pa:g} bar")
         plant = gearbox().with_values({SUPPLY: supply_pa})
         supplies[supply_pa] = check_shifts(plant, {HYBRID: hybrid(plant)}, SHIFTS).rows
-    rows, known = _drawn_rows(Kept(work_folder(folder) / "rows.jsonl"), DRAWS[extent], say)
+    found = _drawn_rows(Kept(work_folder(folder) / "rows.jsonl"), DRAWS[extent], say)
+    rows, after, known = (found[key] for key in ("shifts", "after", "known"))
     text = "\n\n".join(
         [
             shift_table(beside.rows),
             *(f"{1e-5 * p:g} bar\n{shift_table(found)}" for p, found in supplies.items()),
             f"{DRAWS[extent]} draws, missed by\n{_missed(rows)}",
-            told_known(known),
+            told_known(_missed_known(rows, known)),
+            f"after commissioning, missed by\n{_missed(after)}",
+            reached_table({"as delivered": _of(rows, HYBRID), "after": after, "known": known}),
         ]
     )
-    claims = (*_claims(beside.rows, supplies), *_claims_of_draws(rows))
+    drawn_claims = (*_claims_of_draws(rows), *claims_after(after, _of(rows, HYBRID)))
+    claims = (*_claims(beside.rows, supplies), *drawn_claims)
     numbers = {
         "beside": [vars(row) for row in beside.rows],
         "supplies": {f"{1e-5 * p:g} bar": [vars(r) for r in f] for p, f in supplies.items()},
         "draws": {name: _reached(rows, name) for name in SHIFTS},
+        "after commissioning": {name: _reached(after, name) for name in SHIFTS},
+        "known": {name: _reached(known, name) for name in SHIFTS},
         "ranking": ranking(rows),
     }
     return Outcome(text, claims, styled_figures(_shown(beside)), _plain(numbers))
@@ -86,33 +95,30 @@ def hybrid(plant: Plant) -> Controller:
     return design("hybrid-mpc", plant).controller
 
 
-def _drawn_rows(
-    kept: Kept, number: int, say: Callable[[str], None]
-) -> tuple[list[Shift], list[Shift]]:
-    """Shifts of all designs on so many drawn plants, and the missed ones where these are known.
-
-    What is kept is not run again.
-    """
+def _drawn_rows(kept: Kept, number: int, say: Callable[[str], None]) -> dict[str, list[Shift]]:
+    """Shifts on so many drawn plants by what is known of them; what is kept is not run again."""
     pieces = {f"draw {k + 1}": k for k in range(number)}
     found = chosen_workers().keep(
         kept, _draw, pieces, lambda done, of: say(f"{done} of {of} drawn plants")
     )
-    shifts, known = ([Shift(**r) for each in found for r in each[k]] for k in ("shifts", "known"))
-    return shifts, known
+    keys = ("shifts", "after", "known")
+    return {key: [Shift(**row) for each in found for row in each[key]] for key in keys}
 
 
 def _draw(number: int) -> Row:
-    """All four shifts of every design on the plant of a draw, which no design knows.
+    """All four shifts on the plant of a draw, by what is known of it.
 
-    What hybrid MPC misses is done once more with a design and a filter that know the plant.
+    Nothing, by every design; what one recording shows, and all, by hybrid MPC.
     """
     plant, own = gearbox(), f"{HYBRID} {number + 1}"
     truth = _truth(number)
     made = {f"{name} {number + 1}": found for name, found in _compared().items()}
     rows = check_shifts(truth, made, SHIFTS, believed=plant, seed=number).rows
-    missed = [row.scenario for row in rows if row.design == own and not row.reached]
-    known = check_shifts(truth, {own: hybrid(truth)}, missed, seed=number).rows if missed else ()
-    return {"shifts": [vars(row) for row in rows], "known": [vars(row) for row in known]}
+    fitted = commissioned(truth, number).rig.plant
+    after = check_shifts(truth, {own: hybrid(fitted)}, SHIFTS, believed=fitted, seed=number).rows
+    known = check_shifts(truth, {own: hybrid(truth)}, SHIFTS, seed=number).rows
+    groups = {"shifts": rows, "after": after, "known": known}
+    return {key: [vars(row) for row in found] for key, found in groups.items()}
 
 
 def _truth(number: int) -> Plant:
@@ -130,6 +136,12 @@ def told_known(known: Iterable[Shift]) -> str:
     rig, numbers = default_rig(gearbox()), dict.fromkeys(_number(row) for row in known)
     lines = [f"draw {k}: {apart(rig, _truth(k - 1))}" for k in numbers]
     return "\n".join([head, *lines])
+
+
+def _missed_known(rows: Iterable[Shift], known: Iterable[Shift]) -> list[Shift]:
+    """Of the shifts with a known plant those that are missed without."""
+    missed = {(row.design, row.scenario) for row in _of(rows, HYBRID) if not row.reached}
+    return [row for row in known if (row.design, row.scenario) in missed]
 
 
 def _number(row: Shift) -> int:
