@@ -51,7 +51,8 @@ class Fit:
     cost
         The same with the priors of parameters and start states.
     converged
-        False where the last step still brought more than 1 % of the misfit beyond noise.
+        False where the last step still brought more than 1 % of the misfit beyond noise, or was
+        made with derivatives of a place before it.
     derivatives
         Those that the last step used, with the residual of where the fit ended.
     """
@@ -108,8 +109,8 @@ def fit_windows(
         if stale or at is None:
             at, fresh = linearise(windows, unknowns, now.point, now.residual), True
         now, fall = _advanced(windows, unknowns, at, now)
-        converged = fall < CONVERGED
-        if converged and fresh:
+        converged = fresh and fall < CONVERGED
+        if converged:
             break
         stale, fresh = fall < AGAIN, False
         if not stale:
