@@ -7,7 +7,7 @@ import pytest
 
 from studies.text_of_results import errors_text
 from workbench.fitting.errors import Place, plain_ratio, signal_errors
-from workbench.fitting.gauss_newton import best_of_each, fit_windows, points_costs
+from workbench.fitting.gauss_newton import best_of_each, beyond_noise, fit_windows, points_costs
 from workbench.fitting.linearised import Point
 from workbench.fitting.noise import measured_noise
 from workbench.fitting.problem import fuller, staged
@@ -31,12 +31,16 @@ def plant():
 
 @pytest.fixture(scope="module")
 def recording(plant):
+    return sines(plant, NOISE)
+
+
+def sines(plant, noise):
     """2 s of sines through the dead zone, with sensor noise."""
     time_s = 1e-3 * np.arange(2000)
     u = 4.95 + 0.9 * np.sin(2 * np.pi * 1.1 * time_s) + 0.3 * np.sin(2 * np.pi * 2.7 * time_s)
     run = simulate(plant, Recording("sines", 1e-3, {"valve.command_v": u}))
     rng = np.random.default_rng(5)
-    noisy = {n: run[n] + s * rng.standard_normal(len(run)) for n, s in NOISE.items()}
+    noisy = {n: run[n] + s * rng.standard_normal(len(run)) for n, s in noise.items()}
     return Recording("sines", 1e-3, {"valve.command_v": u, **noisy})
 
 
@@ -142,6 +146,39 @@ def test_a_fit_brings_a_wrong_mass_back(plant, recording):
     fit = fit_windows(windows, unknowns, iterations=20)
 
     assert fit.plant.values["slide.mass_kg"] == pytest.approx(2.22, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"friction.stiction_excess_n": 1.5, "valve_dead_zone.half_width_v": 1.02},
+        {"friction.coulomb_force_n": 1.2, "slide.mass_kg": 1.1, "valve.flow_area_m2": 0.97},
+    ],
+    ids=["dead zone", "mass"],
+)
+def test_a_fit_that_has_converged_gains_no_more_from_where_it_ended(plant, wrong):
+    """Noise that no fit takes away is most of the cost here: 1 % of it is a third of the misfit."""
+    loud = {name: 10.0 * sigma for name, sigma in NOISE.items()}
+    windows = cut_windows(plant, [sines(plant, loud)], loud)
+    off = plant.with_values({name: by * plant.values[name] for name, by in wrong.items()})
+    unknowns = nominal_unknowns(off, {}, {})
+
+    found = fit_windows(windows.with_plant(off), unknowns, iterations=40)
+    again = fit_windows(found.windows, unknowns, found.point, iterations=40)
+
+    assert found.converged
+    assert found.cost - again.cost < 0.01 * beyond_noise(found.cost, windows)
+
+
+def test_a_fit_that_is_cut_short_does_not_say_that_it_has_converged(plant, recording):
+    off = plant.with_values({"slide.mass_kg": 1.15 * plant.values["slide.mass_kg"]})
+    windows = cut_windows(off, [recording], NOISE)
+
+    found = fit_windows(windows, nominal_unknowns(off, {}, {}), iterations=10)
+    again = fit_windows(windows, found.unknowns, found.point, iterations=1)
+
+    assert again.cost < 0.9 * found.cost
+    assert not found.converged
 
 
 def test_what_is_absent_fixed_or_known_is_not_moved(plant):

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from workbench.comparison.regimes import regime_shares
 from workbench.consistency import trusted
 from workbench.diagnosis.credible import credible
+from workbench.diagnosis.dominance import dominant_first
 from workbench.diagnosis.evidence import WARNINGS, held_out, weighed
 from workbench.diagnosis.judge import (
     CERTAIN_SHARE,
@@ -33,7 +34,7 @@ from workbench.diagnosis.pairs import with_pairs
 from workbench.diagnosis.ranking import ranked
 from workbench.diagnosis.refit import Refit, refit, refit_from, refit_shift
 from workbench.diagnosis.result import NAMING, Diagnosis, Law, Ranked, Where
-from workbench.diagnosis.rough import rough_fit
+from workbench.diagnosis.rough import Rough, rough_fit
 from workbench.diagnosis.scan import Profile, scan_catalogue, scan_from_priors
 from workbench.diagnosis.settle import with_settled_sizes
 from workbench.diagnosis.shifts import Shift, shifts
@@ -114,7 +115,7 @@ def diagnose(
     verdict = judged(ranking, law, evidence.strong, far)
     if verdict in NAMING or (ranking and ranking[0].accepted):
         progress("sizes of what is named")
-        ranking = with_settled_sizes(problem, ranking)
+        ranking = dominant_first(with_settled_sizes(problem, ranking))
     best = ranking[0] if verdict in NAMING else None
     if best and best.fit and not best.fit.converged:
         warnings += (f"the refit with {best.candidate.name} did not converge: its size may be off",)
@@ -159,10 +160,10 @@ def _followed(problem: Problem, where: Where | None, progress: Progress) -> _Fol
     progress(f"first fits of {len(looked)} candidates")
     begun = sorted((rough_fit(problem, p) for p in looked), key=lambda each: -each.share)
     refits: list[Refit] = []
-    for each in begun[:REFITTED]:
+    for each in _to_refit(begun, where):
         accepted = any(not reasons_against(problem.base, found) for found in refits)
         promising = each.share > WORTH_A_REFIT * begun[0].share
-        hopeful = not accepted and each.share > LEAST_TRAINING
+        hopeful = each.share > LEAST_TRAINING and (not accepted or _acts_there(each, where))
         if promising or hopeful or not refits:
             progress(f"refit with {each.profile.candidate.name}")
             refits.append(refit(problem, each))
@@ -179,6 +180,19 @@ def _followed(problem: Problem, where: Where | None, progress: Progress) -> _Fol
             refits = _from_the_leader(problem, refits, profiles, progress)
     shares = {each.profile.candidate.name: each.share for each in begun}
     return _Followed(profiles, shares, refits, moved)
+
+
+def _to_refit(begun: Sequence[Rough], where: Where | None) -> list[Rough]:
+    """The best few first fits, and of the rest those that act where the smoother finds a lack.
+
+    A constant force that a first fit leaves in a poor place is not to be lost behind four sensors.
+    """
+    there = [each for each in begun if _acts_there(each, where)][:LOCATED]
+    return [b for k, b in enumerate(begun) if k < REFITTED or any(b is each for each in there)]
+
+
+def _acts_there(begun: Rough, where: Where | None) -> bool:
+    return where is not None and acts_in(begun.profile.candidate, where.balance)
 
 
 def _best_first(problem: Problem, refits: Sequence[Refit]) -> list[Refit]:

@@ -17,10 +17,10 @@ from workbench.diagnosis.rough import Rough, windows_for
 from workbench.diagnosis.shifts import Shift
 from workbench.fitting.error_model import OUTLYING
 from workbench.fitting.errors import plain_ratio
-from workbench.fitting.gauss_newton import Fit, fit_windows, points_costs
+from workbench.fitting.gauss_newton import Fit, beyond_noise, fit_windows, points_costs
 from workbench.fitting.linearised import Point
 from workbench.fitting.posterior import posterior_deviation
-from workbench.fitting.problem import Problem, beyond_noise, misfit
+from workbench.fitting.problem import Problem, misfit
 from workbench.fitting.start_states import carried
 from workbench.fitting.unknowns import WIDE
 

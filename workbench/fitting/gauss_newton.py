@@ -33,8 +33,9 @@ LONGEST_FREE_STEP = 40.0  # of one without a prior, which is counted in tenths o
 LONGEST_START_STEP = 8.0  # of a start state, in its deviations
 DAMPINGS = (0.0, 0.3, 3.0, 30.0)
 HALF = 0.5  # of the fall that the quadratic model promises: then a step needs no rivals
-AGAIN = 0.02  # relative fall of the cost above which derivatives are used once more
-CONVERGED = 0.01  # relative fall of the cost below which a fit has converged
+AGAIN = 0.02  # fall, in parts of the misfit, above which derivatives are used once more
+CONVERGED = 0.01  # the same, below which a fit has converged
+NOISE_KNOWN_TO = 0.05  # of its square
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,8 @@ class Fit:
     cost
         The same with the priors of parameters and start states.
     converged
-        False where the last step still brought more than 1 %.
+        False where the last step still brought more than 1 % of the misfit beyond noise, or was
+        made with derivatives of a place before it.
     derivatives
         Those that the last step used, with the residual of where the fit ended.
     """
@@ -93,8 +95,10 @@ def fit_windows(
 ) -> Fit:
     """Fit the unknowns and the start states; see the module's docstring.
 
-    Every step is taken only if the cost falls.  As long as steps bring more than 2 %, the next
-    uses the same derivatives, corrected by what the step showed: they are the dear part.
+    Every step is taken only if the cost falls.  As long as steps bring more than 2 % of the misfit
+    beyond noise, the next uses the same derivatives, corrected by what the step showed: they are
+    the dear part.  Parts of the whole cost would be no measure: most of it is noise that no fit
+    takes away, and effects that differ by less would be compared half fitted.
     ``start`` is a point, or what it costs where it was run already.  ``at`` are derivatives to
     begin with, taken near by, with the residual of the start.
     """
@@ -105,8 +109,8 @@ def fit_windows(
         if stale or at is None:
             at, fresh = linearise(windows, unknowns, now.point, now.residual), True
         now, fall = _advanced(windows, unknowns, at, now)
-        converged = fall < CONVERGED
-        if converged and fresh:
+        converged = fresh and fall < CONVERGED
+        if converged:
             break
         stale, fresh = fall < AGAIN, False
         if not stale:
@@ -119,7 +123,7 @@ def fit_windows(
 def follow(
     windows: Windows, unknowns: Unknowns, start: Cost, at: Linearised, iterations: int
 ) -> Fit:
-    """Steps with derivatives ``at`` taken near by, as long as they bring more than 2 %.
+    """Steps with derivatives ``at`` taken near by, while they bring more than 2 % of the misfit.
 
     No derivative is taken anew, which is what makes a fit dear: where it ends may be short of the
     minimum.
@@ -137,9 +141,9 @@ def follow(
 def _advanced(
     windows: Windows, unknowns: Unknowns, at: Linearised, now: Cost
 ) -> tuple[Cost, float]:
-    """Where a step leads, or where it began if that costs less; and its relative fall."""
+    """Where a step leads, or where it began if that costs less; and its fall, of the misfit."""
     found = _stepped(windows, unknowns, at, now)
-    fall = (now.cost - found.cost) / max(now.cost, 1e-12)
+    fall = (now.cost - found.cost) / beyond_noise(now.cost, windows)
     return min(now, found, key=lambda each: each.cost), fall
 
 
@@ -164,7 +168,7 @@ def _stepped(windows: Windows, unknowns: Unknowns, at: Linearised, now: Cost) ->
     if not len(unknowns):
         return best_of_each((first, *damped.rows))
     best = min((first, damped.best), key=lambda each: each.cost)
-    if now.cost - best.cost > AGAIN * now.cost:
+    if now.cost - best.cost > AGAIN * beyond_noise(now.cost, windows):
         return best
     worse = first.by_window > now.by_window
     if not worse.any() or worse.all():
@@ -172,6 +176,15 @@ def _stepped(windows: Windows, unknowns: Unknowns, at: Linearised, now: Cost) ->
     left = [_after(windows, unknowns, now.point, s) for s in _damped_steps(at, unknowns, ~worse)]
     again = points_costs(windows, unknowns, left).best
     return min(best, again, key=lambda each: each.cost)
+
+
+def beyond_noise(squares: float, windows: Windows) -> float:
+    """What a sum of squared weighted residuals holds beyond sensor noise, at least 1.
+
+    Noise is measured in still pieces and known to a few percent only: what is left above it counts
+    as no less than that, or a share of next to nothing would speak for an effect.
+    """
+    return max(squares - windows.floor, NOISE_KNOWN_TO * windows.floor, 1.0)
 
 
 Step = tuple[np.ndarray, np.ndarray]  # of the scaled unknowns, and of the scaled start states

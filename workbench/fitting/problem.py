@@ -9,13 +9,13 @@ import numpy as np
 
 from workbench.candidate import Candidate
 from workbench.effect import Effect
-from workbench.fitting.gauss_newton import Fit, fit_windows, points_costs
+from workbench.fitting.gauss_newton import Fit, beyond_noise, fit_windows, points_costs
 from workbench.fitting.linearised import Linearised, Point
 from workbench.fitting.noise import measured_noise
 from workbench.fitting.start_states import refit_starts
 from workbench.fitting.unknowns import Unknowns, nominal_unknowns
 from workbench.fitting.window_length import window_length_s
-from workbench.fitting.windows import MOST_WINDOWS, Windows, cut_windows, one_clock
+from workbench.fitting.windows import MOST_WINDOWS, cut_windows, one_clock
 from workbench.plant import Plant
 from workbench.recording import Recording, same_data
 from workbench.rig import Rig
@@ -25,7 +25,6 @@ ITERATIONS = 12  # with scales from the first fit
 LEAST_HELD_OUT_WINDOWS = 24
 NO_EVIDENCE = "a validation recording is one of the training recordings, which proves nothing"
 FAR = 1.5  # prior deviations: beyond, a parameter may imitate what is missing
-NOISE_KNOWN_TO = 0.05  # of its square
 LEAST_IMPROVEMENT = 0.03  # of the misfit, for a prior fit to be taken up again
 
 
@@ -95,15 +94,6 @@ def misfit(fit: Fit) -> float:
     prior has explained less than one that stays near it.
     """
     return beyond_noise(fit.cost, fit.windows)
-
-
-def beyond_noise(squares: float, windows: Windows) -> float:
-    """What a sum of squared weighted residuals holds beyond sensor noise, at least 1.
-
-    Noise is measured in still pieces and known to a few percent only: what is left above it counts
-    as no less than that, or a share of next to nothing would speak for an effect.
-    """
-    return max(squares - windows.floor, NOISE_KNOWN_TO * windows.floor, 1.0)
 
 
 def staged(whole: Plant, *members: str) -> Plant:
