@@ -5,9 +5,14 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from studies.checking import drawn
 from studies.commissioning import claims, commissioned, played, reached_table, recorded
 from studies.shift_check import NOISE, SHIFTS, Shift
+from workbench.fitting.errors import errors_of
+from workbench.fitting.problem import pose
+from workbench.fitting.short_windows import better_from_short_windows
 from workbench.plants.gearbox import COMMANDS, gearbox
+from workbench.rig import default_rig
 from workbench.simulation import simulate
 
 OTHER = gearbox().with_values(
@@ -77,10 +82,28 @@ def test_a_commissioning_that_saves_no_shift_is_told():
 
 @pytest.mark.slow
 def test_one_recording_halves_what_is_wrong_of_supply_flows_dead_volume_and_detent():
-    """It leaves a third of the dead volume's error: with impacts in it a fit stops short."""
     fitted, first = commissioned(OTHER, 0).rig.plant.values, gearbox().values
     changed = [name for name, value in OTHER.values.items() if value != first[name]]
     left = [abs(fitted[n] - OTHER.values[n]) / abs(first[n] - OTHER.values[n]) for n in changed]
 
     assert len(changed) == 5
     assert max(left) < 0.5
+
+
+@pytest.mark.slow
+def test_short_windows_lead_out_of_a_valley_where_every_impact_comes_at_the_wrong_instant():
+    """A drawn actuator on which a fit from the priors ends at seven times the noise."""
+    truth = drawn(default_rig(gearbox()), np.random.default_rng(8))
+    recording = recorded(truth, 7)
+    from_priors = pose(default_rig(gearbox()), [recording])
+    found = better_from_short_windows(from_priors, [recording])
+
+    assert worst(from_priors) > 3.0
+    assert worst(found) < 1.5
+    assert better_from_short_windows(found, [recording]) is found
+
+
+def worst(problem):
+    """Largest mean square error of an output over that of its noise."""
+    found = errors_of(problem.base)["train"]
+    return max(each.chi2_per_sample for each in found.values())

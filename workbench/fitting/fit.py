@@ -13,6 +13,7 @@ from workbench.fitting.errors import Errors, errors_of
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.posterior import fitted_rig, posterior_covariance
 from workbench.fitting.problem import NO_EVIDENCE, Problem, pose, proves_nothing
+from workbench.fitting.short_windows import better_from_short_windows
 from workbench.fitting.start_states import refit_starts
 from workbench.fitting.unknowns import nominal_unknowns
 from workbench.plant import require
@@ -92,6 +93,7 @@ def fit(
     progress("fit")
     problem = pose(held, train, validation)
     before = _untouched(problem)
+    problem = better_from_short_windows(problem, train)
     base = problem.base
     covariance = posterior_covariance(base)
     return FitReport(

@@ -1,0 +1,82 @@
+"""A way out of a poor valley: the parameters are fitted to shorter windows first.
+
+Within a window errors pile up, and where parts meet or break away the cost is rough: a fit from the
+priors may end in a valley in which every long window runs past its impacts at the wrong instants.
+Windows of a tenth and then of a third of the length start anew before that happens, and their cost
+is smooth; from where they lead, the long windows know more of the parameters.
+
+Source: multiple shooting, Bock 1983, "Recent advances in parameter identification techniques for
+ODE", whose short intervals widen the valley of the right parameters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from workbench.fitting.gauss_newton import Fit, fit_windows
+from workbench.fitting.linearised import Point
+from workbench.fitting.problem import FIRST_ITERATIONS, ITERATIONS, LEAST_IMPROVEMENT, Problem
+from workbench.fitting.start_states import refit_starts
+from workbench.fitting.window_length import moves
+from workbench.fitting.windows import cut_windows
+from workbench.recording import Recording
+
+SHARES = (0.1, 0.3)  # of the length of a window, one after the other
+FEWEST_SAMPLES = 20  # of a short window
+AT_NOISE = 1.5  # mean square of an output's error over that of its noise
+
+
+def better_from_short_windows(problem: Problem, train: Sequence[Recording]) -> Problem:
+    """The problem with the fit that begins where short windows lead, if that one is better.
+
+    Nothing is tried where all outputs are at their noise, nothing moves, or windows are short.
+    """
+    base = problem.base
+    plant = base.windows.plant
+    tenth = round(SHARES[0] * base.windows.length)
+    if at_noise(base) or not moves(plant) or not len(base.unknowns) or tenth < FEWEST_SAMPLES:
+        return problem
+    t = _of_short_windows(problem, train)
+    windows = base.windows
+    tried = fit_windows(windows, base.unknowns, Point(t, windows.start), ITERATIONS)
+    if tried.cost > base.cost - LEAST_IMPROVEMENT * problem.misfit:
+        return problem
+    windows = windows.rescaled(tried.residual)
+    better = fit_windows(windows, base.unknowns, tried.point, ITERATIONS)
+    return replace(problem, base=better, base_validation=_held_out(problem, better))
+
+
+def at_noise(fit: Fit) -> bool:
+    """True where the mean square error of every output is that of its noise."""
+    windows = fit.windows
+    recorded = np.maximum((windows.weight > 0).sum(axis=(1, 2)), 1)
+    squares = ((fit.residual * windows.scale[:, :, None]) ** 2).sum(axis=(1, 2)) / recorded
+    return bool(np.all(squares < AT_NOISE * windows.noise**2))
+
+
+def _of_short_windows(problem: Problem, train: Sequence[Recording]) -> np.ndarray:
+    """Scaled unknowns, from the priors over ever longer windows."""
+    long, unknowns = problem.base.windows, problem.base.unknowns
+    noise = dict(zip(long.plant.measured, long.noise.tolist(), strict=True))
+    length_s = long.length * train[0].sample_time_s
+    t = problem.at_priors
+    for share in SHARES:
+        windows = cut_windows(long.plant, train, noise, share * length_s, round(len(long) / share))
+        at = long.plant.with_values(unknowns.values(t))
+        windows = windows.rescaled(windows.residuals([at], windows.start)[0])
+        first = fit_windows(windows, unknowns, Point(t, windows.start), FIRST_ITERATIONS)
+        windows = windows.rescaled(first.residual)
+        t = fit_windows(windows, unknowns, first.point, ITERATIONS).point.t
+    return t
+
+
+def _held_out(problem: Problem, better: Fit) -> Fit | None:
+    """The better plant on the held-out windows, on its own yardstick."""
+    if problem.base_validation is None:
+        return None
+    windows = problem.base_validation.windows.scaled_like(better.windows)
+    rough = refit_starts(windows, better.plant.values)
+    return refit_starts(windows.capped(rough.residual), better.plant.values, rough)
