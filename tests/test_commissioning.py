@@ -105,5 +105,5 @@ def test_short_windows_lead_out_of_a_valley_where_every_impact_comes_at_the_wron
 
 def worst(problem):
     """Largest mean square error of an output over that of its noise."""
-    found = errors_of(problem.base)["train"]
+    found = errors_of(problem.base, None)["train"]
     return max(each.chi2_per_sample for each in found.values())
