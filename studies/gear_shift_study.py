@@ -21,7 +21,7 @@ from controllers.switched_feedback import averaged, switched_lq, switched_pd
 from linearize.standard import shift_modes
 from studies.checking import apart, drawn, styled_figures
 from studies.commissioning import claims as claims_after
-from studies.commissioning import commissioned, reached_table
+from studies.commissioning import commissioned, made_on_every_plant, reached_table
 from studies.kept import Kept, Row
 from studies.shift_check import SHIFTS, Shift, ShiftCheck, check_shifts, shift_table
 from studies.study import Claim, Extent, Outcome, Study
@@ -200,10 +200,7 @@ def _claims(rows: Iterable[Shift], supplies: Mapping[float, Iterable[Shift]]) ->
 
 
 def _claims_of_draws(rows: Iterable[Shift]) -> Iterator[Claim]:
-    for name in SHIFTS:
-        share = _reached(rows, name)
-        claim = f"{HYBRID}: {name} is fast and soft on every drawn plant"
-        yield Claim(claim, f"{100.0 * share:.0f} % of them", share == 1.0)
+    yield from made_on_every_plant(HYBRID, _of(rows, HYBRID))
     times = ranking(rows)
     best, middle, last = (np.array(found) for found in times.values())
     kept = (best <= middle) & (middle < last)

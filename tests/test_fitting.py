@@ -157,7 +157,7 @@ def test_a_fit_brings_a_wrong_mass_back(plant, recording):
     ids=["dead zone", "mass"],
 )
 def test_a_fit_that_has_converged_gains_no_more_from_where_it_ended(plant, wrong):
-    """Noise that no fit takes away is most of the cost here: 1 % of it is a third of the misfit."""
+    """Noise that no fit takes away is most of the cost here: 1 % of it is a fifth of the misfit."""
     loud = {name: 10.0 * sigma for name, sigma in NOISE.items()}
     windows = cut_windows(plant, [sines(plant, loud)], loud)
     off = plant.with_values({name: by * plant.values[name] for name, by in wrong.items()})

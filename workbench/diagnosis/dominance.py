@@ -21,14 +21,14 @@ Source: Box and Draper 1965, "The Bayesian estimation of common parameters from 
 
 from __future__ import annotations
 
-from dataclasses import replace
 from math import log
 
 import numpy as np
 
-from workbench.diagnosis.judge import LARGEST_TIE
+from workbench.diagnosis.ranking import grouped
 from workbench.diagnosis.result import Ranked
 from workbench.effect import Kind
+from workbench.fitting.errors import penalised_rmse
 from workbench.fitting.gauss_newton import Fit
 
 CLEARLY_LIKELIER = -log(0.9)  # a tenth of the mean square held out
@@ -47,7 +47,7 @@ def dominant_first(ranking: tuple[Ranked, ...]) -> tuple[Ranked, ...]:
     if first is leader:
         return ranking
     rest = [row for row in ranking if row.candidate.name not in names]
-    return (*_regrouped([first, *(row for row in group if row is not first)]), *rest)
+    return (*grouped([first, *(row for row in group if row is not first)]), *rest)
 
 
 def dominates(row: Ranked, other: Ranked) -> bool:
@@ -73,21 +73,4 @@ def _undominated(group: list[Ranked]) -> Ranked:
 
 def _unlikely(fit: Fit) -> float:
     """The equation of the module as the mean over outputs, none of them below its noise."""
-    windows = fit.windows
-    recorded = np.maximum((windows.weight > 0).sum(axis=(1, 2)), 1)
-    squares = ((fit.residual * windows.scale[:, :, None]) ** 2).sum(axis=(1, 2)) / recorded
-    return float(np.mean(np.log(np.maximum(squares, windows.noise**2))))
-
-
-def _regrouped(group: list[Ranked]) -> list[Ranked]:
-    """Rows of what does the same, with the first three as the printed tie, the others the crowd."""
-    names = [row.candidate.name for row in group]
-    printed, crowd = names[:LARGEST_TIE], tuple(names[LARGEST_TIE:])
-    return [
-        replace(
-            row,
-            tied_with=tuple(n for n in printed if n != name) if name in printed else (),
-            crowd=crowd if name == names[0] else (),
-        )
-        for name, row in zip(names, group, strict=True)
-    ]
+    return float(2.0 * np.mean(np.log(np.maximum(penalised_rmse(fit), fit.windows.noise))))

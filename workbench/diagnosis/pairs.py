@@ -59,9 +59,9 @@ def with_pairs(
     rows = {}
     for each in refits:
         name = each.candidate.name
-        tied = {name: tuple(n for n in names if n != name)} if name in names else {}
-        own = refitted_row(problem, each, tied)
-        rows[name] = replace(own, accepted=not against[name], reasons=against[name])
+        tied = tuple(n for n in names if n != name) if name in names else ()
+        own = refitted_row(problem, each)
+        rows[name] = replace(own, accepted=not against[name], reasons=against[name], tied_with=tied)
     accepted = [rows[name] for name in names]
     refused = [row for name, row in rows.items() if name not in names]
     followed = [row for row in ranking if row.fit is not None]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from workbench.candidate import Candidate
@@ -39,18 +39,14 @@ def ranked(
     by_name = {profile.candidate.name: profile for profile in profiles}
     group = tie_group(problem.base, refits, by_name) if refits else []
     together = [each.candidate.name for each in group]
-    names, crowd = together[:LARGEST_TIE], tuple(together[LARGEST_TIE:])
-    tied = {name: tuple(n for n in names if n != name) for name in names}
     rows = {
-        r.candidate.name: refitted_row(problem, r, tied, by_name.get(r.candidate.name))
-        for r in refits
+        r.candidate.name: refitted_row(problem, r, by_name.get(r.candidate.name)) for r in refits
     }
     for name in (each for each in together if each in by_name):
         alike = (n for n in together if n != name and n in by_name)
         shares = {n: imitation(by_name[name], by_name[n]) for n in alike}
         rows[name] = replace(rows[name], imitated_by=shares)
-    if crowd:
-        rows[names[0]] = replace(rows[names[0]], crowd=crowd)
+    rows |= {row.candidate.name: row for row in grouped([rows[name] for name in together])}
     order = [*together, *(name for name in rows if name not in together)]
     followed = [rows[name] for name in order if predicts_row(rows[name])]
     refused = [rows[name] for name in order if not predicts_row(rows[name])]
@@ -59,6 +55,20 @@ def ranked(
     rest.sort(key=lambda row: -row.drop_train)
     asked = (*followed, *refused, *rest)
     return (*asked, *_not_asked(problem, {row.candidate.name for row in asked}))
+
+
+def grouped(rows: Sequence[Ranked]) -> list[Ranked]:
+    """Rows of what does the same, with the first three as the printed tie, the others the crowd."""
+    names = [row.candidate.name for row in rows]
+    printed, crowd = names[:LARGEST_TIE], tuple(names[LARGEST_TIE:])
+    return [
+        replace(
+            row,
+            tied_with=tuple(n for n in printed if n != name) if name in printed else (),
+            crowd=crowd if name == names[0] else (),
+        )
+        for name, row in zip(names, rows, strict=True)
+    ]
 
 
 def _not_asked(problem: Problem, asked: set[str]) -> list[Ranked]:
@@ -104,7 +114,6 @@ def predicts_row(row: Ranked) -> bool:
 def refitted_row(
     problem: Problem,
     each: Refit,
-    tied: Mapping[str, tuple[str, ...]],
     profile: Profile | None = None,
 ) -> Ranked:
     """The row of a refit; a single effect has the profile of its scan, a parameter has none."""
@@ -116,7 +125,7 @@ def refitted_row(
         size=each.size,
         drop_train=each.drop_train,
         drop_validation=each.drop_validation,
-        tied_with=tied.get(each.candidate.name, ()),
+        tied_with=(),
         compensable=profile.compensation if profile else 1.0,
         decided_by=DecidedBy.REFIT,
         accepted=not against,

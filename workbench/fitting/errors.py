@@ -97,11 +97,11 @@ def plain_ratio(before: Fit | None, after: Fit | None) -> float:
     """
     if before is None or after is None:
         return float("nan")
-    ratios = _penalised_rmse(after) / np.maximum(_penalised_rmse(before), 1e-300)
+    ratios = penalised_rmse(after) / np.maximum(penalised_rmse(before), 1e-300)
     return float(np.exp(2.0 * np.mean(np.log(np.maximum(ratios, 1e-12)))))
 
 
-def _penalised_rmse(fit: Fit) -> np.ndarray:
+def penalised_rmse(fit: Fit) -> np.ndarray:
     """RMSE of each output in SI with the penalty of what could not be simulated, (n_y,)."""
     windows = fit.windows
     squares = ((fit.residual * windows.scale[:, :, None]) ** 2).sum(axis=(1, 2))

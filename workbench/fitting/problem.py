@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,12 +10,12 @@ import numpy as np
 from workbench.candidate import Candidate
 from workbench.effect import Effect
 from workbench.fitting.gauss_newton import Fit, beyond_noise, fit_windows, points_costs
-from workbench.fitting.linearised import Linearised, Point
+from workbench.fitting.linearised import Linearised, Point, plant_at
 from workbench.fitting.noise import measured_noise
 from workbench.fitting.start_states import refit_starts
 from workbench.fitting.unknowns import Unknowns, nominal_unknowns
 from workbench.fitting.window_length import window_length_s
-from workbench.fitting.windows import MOST_WINDOWS, cut_windows, one_clock
+from workbench.fitting.windows import MOST_WINDOWS, Windows, cut_windows, one_clock
 from workbench.plant import Plant
 from workbench.recording import Recording, same_data
 from workbench.rig import Rig
@@ -172,27 +172,26 @@ def pose(
     length_s = window_length_s(plant, train, validation)
     windows = cut_windows(plant, train, noise, length_s, most_windows)
     unknowns = nominal_unknowns(plant, rig.deviations, rig.fixed, added)
-    windows = windows.rescaled(windows.residuals([plant], windows.start)[0])
-    rough = fit_windows(windows, unknowns, iterations=FIRST_ITERATIONS)
-    windows = windows.rescaled(rough.residual)
-    base = fit_windows(windows, unknowns, rough.point, iterations=ITERATIONS)
+    base = fitted_twice(windows, unknowns, unknowns.scaled(plant.values))
     held_out = None
     if validation:
+        # half as many as the training has are enough to judge a plant that is not fitted to them
         most = max(len(windows) // 2, LEAST_HELD_OUT_WINDOWS)
-        held_out = _held_out(validation, base, noise, most)
+        cut_s = windows.length * train[0].sample_time_s
+        held_out = held_out_fit(cut_windows(plant, validation, noise, cut_s, most), base)
     return Problem(rig, whole, added, base, held_out)
 
 
-def _held_out(
-    validation: Iterable[Recording], base: Fit, noise: dict[str, float], most: int
-) -> Fit:
-    """The base on windows of the held-out recordings, on the yardstick of the training.
+def fitted_twice(windows: Windows, unknowns: Unknowns, t: np.ndarray) -> Fit:
+    """A fit from scaled unknowns (n_p,), the second time with the error model of the first."""
+    start = Point(t, windows.start)
+    windows = windows.rescaled(windows.residuals([plant_at(windows, unknowns, t)], start.starts)[0])
+    rough = fit_windows(windows, unknowns, start, FIRST_ITERATIONS)
+    return fit_windows(windows.rescaled(rough.residual), unknowns, rough.point, ITERATIONS)
 
-    Half as many windows as the training has are enough to judge a plant that is not fitted to them.
-    """
-    sample_time_s = base.windows.recordings[0].sample_time_s
-    length_s = base.windows.length * sample_time_s
-    windows = cut_windows(base.windows.plant, validation, noise, length_s, most)
+
+def held_out_fit(windows: Windows, base: Fit) -> Fit:
+    """The base on held-out windows, on the yardstick of the training."""
     windows = windows.scaled_like(base.windows)
     rough = refit_starts(windows, base.plant.values)
     return refit_starts(windows.capped(rough.residual), base.plant.values, rough)

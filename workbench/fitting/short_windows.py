@@ -16,16 +16,21 @@ from dataclasses import replace
 
 import numpy as np
 
+from workbench.fitting.errors import penalised_rmse
 from workbench.fitting.gauss_newton import Fit, fit_windows
 from workbench.fitting.linearised import Point
-from workbench.fitting.problem import FIRST_ITERATIONS, ITERATIONS, LEAST_IMPROVEMENT, Problem
-from workbench.fitting.start_states import refit_starts
-from workbench.fitting.window_length import moves
+from workbench.fitting.problem import (
+    ITERATIONS,
+    LEAST_IMPROVEMENT,
+    Problem,
+    fitted_twice,
+    held_out_fit,
+)
+from workbench.fitting.window_length import FEWEST_SAMPLES, moves
 from workbench.fitting.windows import cut_windows
 from workbench.recording import Recording
 
 SHARES = (0.1, 0.3)  # of the length of a window, one after the other
-FEWEST_SAMPLES = 20  # of a short window
 AT_NOISE = 1.5  # mean square of an output's error over that of its noise
 
 
@@ -46,15 +51,13 @@ def better_from_short_windows(problem: Problem, train: Sequence[Recording]) -> P
         return problem
     windows = windows.rescaled(tried.residual)
     better = fit_windows(windows, base.unknowns, tried.point, ITERATIONS)
-    return replace(problem, base=better, base_validation=_held_out(problem, better))
+    held_out = problem.base_validation and held_out_fit(problem.base_validation.windows, better)
+    return replace(problem, base=better, base_validation=held_out)
 
 
 def at_noise(fit: Fit) -> bool:
     """True where the mean square error of every output is that of its noise."""
-    windows = fit.windows
-    recorded = np.maximum((windows.weight > 0).sum(axis=(1, 2)), 1)
-    squares = ((fit.residual * windows.scale[:, :, None]) ** 2).sum(axis=(1, 2)) / recorded
-    return bool(np.all(squares < AT_NOISE * windows.noise**2))
+    return bool(np.all(penalised_rmse(fit) ** 2 < AT_NOISE * fit.windows.noise**2))
 
 
 def _of_short_windows(problem: Problem, train: Sequence[Recording]) -> np.ndarray:
@@ -65,18 +68,5 @@ def _of_short_windows(problem: Problem, train: Sequence[Recording]) -> np.ndarra
     t = problem.at_priors
     for share in SHARES:
         windows = cut_windows(long.plant, train, noise, share * length_s, round(len(long) / share))
-        at = long.plant.with_values(unknowns.values(t))
-        windows = windows.rescaled(windows.residuals([at], windows.start)[0])
-        first = fit_windows(windows, unknowns, Point(t, windows.start), FIRST_ITERATIONS)
-        windows = windows.rescaled(first.residual)
-        t = fit_windows(windows, unknowns, first.point, ITERATIONS).point.t
+        t = fitted_twice(windows, unknowns, t).point.t
     return t
-
-
-def _held_out(problem: Problem, better: Fit) -> Fit | None:
-    """The better plant on the held-out windows, on its own yardstick."""
-    if problem.base_validation is None:
-        return None
-    windows = problem.base_validation.windows.scaled_like(better.windows)
-    rough = refit_starts(windows, better.plant.values)
-    return refit_starts(windows.capped(rough.residual), better.plant.values, rough)
