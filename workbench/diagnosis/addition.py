@@ -12,7 +12,7 @@ from workbench.diagnosis.diagnose import Progress, silent
 from workbench.diagnosis.evidence import WARNINGS, Recordings, held_out, weighed
 from workbench.diagnosis.law import empirical_law, plant_with_terms
 from workbench.diagnosis.pairs import pair_fit
-from workbench.diagnosis.refit import refit
+from workbench.diagnosis.refit import refit, refit_shaken
 from workbench.diagnosis.result import Diagnosis, Evidence, Law, told
 from workbench.diagnosis.rough import rough_fit
 from workbench.diagnosis.scan import scan, scan_catalogue
@@ -87,7 +87,7 @@ def add(
     base = problem.base
     profiles = scan(problem.whole, base.windows, base.unknowns, base.point, candidates)
     begun = rough_fit(problem, profiles[0]) if len(names) == 1 else pair_fit(problem, profiles)
-    found = refit(problem, begun)
+    found = refit_shaken(problem, refit(problem, begun))
     fit = settled(found.fit, found.candidate)
     before = errors_of(base, problem.base_validation)
     drops = (found.drop_train, found.drop_validation)

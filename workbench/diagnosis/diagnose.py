@@ -20,6 +20,7 @@ from workbench.diagnosis.evidence import WARNINGS, held_out, weighed
 from workbench.diagnosis.judge import (
     CERTAIN_SHARE,
     CLEARLY_LESS,
+    CLOSE_DROP_SAME,
     LEAST_TRAINING,
     SAME_DIRECTION,
     SHARE_REASON,
@@ -32,7 +33,7 @@ from workbench.diagnosis.law import empirical_law
 from workbench.diagnosis.next_recording import recommended
 from workbench.diagnosis.pairs import with_pairs
 from workbench.diagnosis.ranking import ranked
-from workbench.diagnosis.refit import Refit, refit, refit_from, refit_shift
+from workbench.diagnosis.refit import Refit, refit, refit_from, refit_shaken, refit_shift
 from workbench.diagnosis.result import NAMING, Diagnosis, Law, Ranked, Where
 from workbench.diagnosis.rough import Rough, rough_fit
 from workbench.diagnosis.scan import Profile, scan_catalogue, scan_from_priors
@@ -172,7 +173,8 @@ def _followed(problem: Problem, where: Where | None, progress: Progress) -> _Fol
     for shift in [each for each in moved if each.leaves and each.drop > least][:SHIFTS_REFITTED]:
         progress(f"refit with {shift.name} free")
         refits.append(refit_shift(problem, shift, _best_share(refits)))
-    refits = _best_first(problem, refits)
+    progress("the best once more from beside where they ended")
+    refits = _best_first(problem, _shaken(problem, refits))
     led = None
     for _ in range(LEADERS):
         if refits and refits[0].candidate != led:
@@ -193,6 +195,12 @@ def _to_refit(begun: Sequence[Rough], where: Where | None) -> list[Rough]:
 
 def _acts_there(begun: Rough, where: Where | None) -> bool:
     return where is not None and acts_in(begun.profile.candidate, where.balance)
+
+
+def _shaken(problem: Problem, refits: Sequence[Refit]) -> list[Refit]:
+    """The refits, those that come near the best shaken out of shallow valleys."""
+    near = CLOSE_DROP_SAME * max((each.drop_train for each in refits), default=0.0)
+    return [refit_shaken(problem, r) if r.drop_train > near else r for r in refits]
 
 
 def _best_first(problem: Problem, refits: Sequence[Refit]) -> list[Refit]:

@@ -20,7 +20,7 @@ from workbench.diagnosis.addition import Addition, addition, assembled
 from workbench.diagnosis.diagnose import Progress
 from workbench.diagnosis.evidence import weighed
 from workbench.diagnosis.judge import CLEARLY_LESS, reasons_against
-from workbench.diagnosis.refit import Refit, refit, refit_from, refit_shift
+from workbench.diagnosis.refit import Refit, refit, refit_from, refit_shaken, refit_shift
 from workbench.diagnosis.result import Diagnosis, Evidence, Ranked
 from workbench.diagnosis.rough import rough_fit
 from workbench.diagnosis.scan import scan
@@ -215,7 +215,8 @@ def clearly_better(base: Fit, one: Refit, other: Refit) -> bool:
 
 def _put_back(problem: Problem, candidate: Candidate, final: Fit) -> Refit:
     """An effect again in the model without it, from where the final fit has it."""
-    return _shifted(problem, candidate) or refit_from(problem, candidate, final.plant.values)
+    alone = _shifted(problem, candidate) or refit_from(problem, candidate, final.plant.values)
+    return refit_shaken(problem, alone)
 
 
 def _refitted(problem: Problem, candidate: Candidate) -> Refit | None:
@@ -229,7 +230,9 @@ def _refitted(problem: Problem, candidate: Candidate) -> Refit | None:
     profiles = scan(
         problem.whole, base.windows, base.unknowns, base.point, [candidate], base.derivatives
     )
-    return refit(problem, rough_fit(problem, profiles[0])) if profiles else None
+    return (
+        refit_shaken(problem, refit(problem, rough_fit(problem, profiles[0]))) if profiles else None
+    )
 
 
 def _shifted(problem: Problem, candidate: Candidate) -> Refit | None:

@@ -21,6 +21,7 @@ from workbench.fitting.gauss_newton import Fit, beyond_noise, fit_windows, point
 from workbench.fitting.linearised import Point
 from workbench.fitting.posterior import posterior_deviation
 from workbench.fitting.problem import Problem, misfit
+from workbench.fitting.shaken import shaken
 from workbench.fitting.start_states import carried
 from workbench.fitting.unknowns import WIDE
 
@@ -76,6 +77,12 @@ def refit_from(problem: Problem, candidate: Candidate, values: Mapping[str, floa
     starts = carried(problem.base.point.starts, problem.base.windows, windows)
     fit = fit_windows(windows, unknowns, Point(t, starts), ITERATIONS)
     return _refit(problem, candidate, fit, (candidate.strength, *candidate.forms))
+
+
+def refit_shaken(problem: Problem, found: Refit) -> Refit:
+    """A refit, or a lower one near it; see :mod:`workbench.fitting.shaken`."""
+    fit = shaken(found.fit, ITERATIONS)
+    return found if fit is found.fit else _refit(problem, found.candidate, fit, tuple(found.size))
 
 
 def _probes(fit: Fit, names: tuple[str, ...]) -> list[Point]:

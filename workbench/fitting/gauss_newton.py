@@ -218,12 +218,22 @@ def _damped_steps(
     for damping in DAMPINGS:
         dt = -np.linalg.solve(H + damping * np.diag(np.diag(H)), g) if len(g) else np.zeros(0)
         dt = np.clip(dt, -longest, longest)
-        rest = at.residual + (at.parameters @ dt)
-        back = (at.basis.transpose(0, 2, 1) @ rest[:, :, None])[:, :, 0]
-        dx = -np.linalg.solve(at.triangle, back[:, :, None])[:, :, 0] if back.shape[1] else back
-        dx = np.clip(dx.T / (1.0 + damping), -LONGEST_START_STEP, LONGEST_START_STEP)
-        steps.append((dt, dx))
+        steps.append((dt, _starts_with(at, dt, 1.0 / (1.0 + damping))))
     return steps
+
+
+def _starts_with(at: Linearised, dt: np.ndarray, share: float = 1.0) -> np.ndarray:
+    """The step of the scaled start states that suits one of the unknowns, (n_x, n_windows)."""
+    rest = at.residual + (at.parameters @ dt)
+    back = (at.basis.transpose(0, 2, 1) @ rest[:, :, None])[:, :, 0]
+    dx = -np.linalg.solve(at.triangle, back[:, :, None])[:, :, 0] if back.shape[1] else back
+    return np.clip(share * dx.T, -LONGEST_START_STEP, LONGEST_START_STEP)
+
+
+def beside(fit: Fit, dt: np.ndarray) -> Point:
+    """The point a step (n_p,) of the scaled unknowns away, start states as the linear model has."""
+    step = (dt, _starts_with(fit.derivatives, dt))
+    return _after(fit.windows, fit.unknowns, fit.point, step)
 
 
 @dataclass(frozen=True)

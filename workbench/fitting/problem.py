@@ -12,6 +12,7 @@ from workbench.effect import Effect
 from workbench.fitting.gauss_newton import Fit, beyond_noise, fit_windows, points_costs
 from workbench.fitting.linearised import Linearised, Point, plant_at
 from workbench.fitting.noise import measured_noise
+from workbench.fitting.shaken import shaken
 from workbench.fitting.start_states import refit_starts
 from workbench.fitting.unknowns import Unknowns, nominal_unknowns
 from workbench.fitting.window_length import window_length_s
@@ -172,7 +173,7 @@ def pose(
     length_s = window_length_s(plant, train, validation)
     windows = cut_windows(plant, train, noise, length_s, most_windows)
     unknowns = nominal_unknowns(plant, rig.deviations, rig.fixed, added)
-    base = fitted_twice(windows, unknowns, unknowns.scaled(plant.values))
+    base = shaken(fitted_twice(windows, unknowns, unknowns.scaled(plant.values)), ITERATIONS)
     held_out = None
     if validation:
         # half as many as the training has are enough to judge a plant that is not fitted to them
