@@ -7,10 +7,11 @@ errors differ by half seem to do the same.  Once each has been settled (see
 
     -2 log L / n = sum over outputs of log(mean square error)
 
-with n the recorded values of an output.  A rival takes the leader's place where it is likelier in
-training, and held out so much likelier that it leaves a tenth less in every output, as their
-geometric mean.  Both sets have to say so: held out alone a real seal's dry friction would be one
-that grows with the pressure, by as much as chance gives, and in training another seal's would.
+with n the recorded values of an output; compared is the mean over the outputs.  A rival takes the
+leader's place where it is likelier in training, and held out so much likelier that it leaves a
+tenth less in every output, as their geometric mean.  Both sets have to say so: held out alone a
+real seal's dry friction would be one that grows with the pressure, by as much as chance gives, and
+in training another seal's would.
 
 What is tied stays tied: the small errors that every model has weigh as much as the difference
 between two such rivals.

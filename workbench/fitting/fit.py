@@ -93,6 +93,7 @@ def fit(
     progress("fit")
     problem = pose(held, train, validation)
     before = _untouched(problem)
+    progress("the same from short windows, if that leads lower")
     problem = better_from_short_windows(problem, train)
     base = problem.base
     covariance = posterior_covariance(base)

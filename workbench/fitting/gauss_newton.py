@@ -52,7 +52,8 @@ class Fit:
         The same with the priors of parameters and start states.
     converged
         False where the last step still brought more than 1 % of the misfit beyond noise, or was
-        made with derivatives of a place before it.
+        made with derivatives of a place before it.  True in a dent of a rough cost too, where no
+        step leads lower though the linear model promises it.
     derivatives
         Those that the last step used, with the residual of where the fit ended.
     """

@@ -52,7 +52,7 @@ def shaken(fit: Fit, iterations: int) -> Fit:
     for _ in range(PASSES):
         before = fit
         for spread in SPREADS:
-            fit = _lower(fit, _drawn(fit, spread, rng), iterations)
+            fit = _lower(fit, points_about(fit, spread, rng), iterations)
         if fit is before:
             break
     return fit
@@ -69,8 +69,8 @@ def _lower(fit: Fit, points: list[Point], iterations: int) -> Fit:
     return fit_windows(windows, unknowns, tried.point, iterations)
 
 
-def _drawn(fit: Fit, spread: float, rng: np.random.Generator) -> list[Point]:
-    """Points about a fit; what it holds at a bound stays there."""
+def points_about(fit: Fit, spread: float, rng: np.random.Generator) -> list[Point]:
+    """Points drawn about a fit, ``spread`` deviations wide; what is held at a bound stays."""
     normal = normal_equations(fit.derivatives, fit.unknowns)
     values, directions = np.linalg.eigh(normal.hessian)
     root = directions / np.sqrt(np.maximum(values, np.finfo(float).eps * values.max()))
