@@ -89,9 +89,8 @@ def test_no_rival_of_a_small_force_is_left_in_a_dent():
     case = read_cases(CRR_RIG.truth.stored)["constant_force", 1]
     (recorded,) = recordings([case])
     ranking = answer(case, *recorded, CRR_RIG.user_rig(case)).diagnosis.ranking
-    drops = [row.drop_train for row in ranking if row.candidate.cause.name.startswith("sensor_")][
-        :4
-    ]
+    sensors = [row for row in ranking if row.candidate.cause.name.startswith("sensor_")]
+    drops = [row.drop_train for row in sensors[:4]]
 
     assert len(drops) == 4
     assert min(drops) > 0.9 * ranking[0].drop_train

@@ -28,7 +28,7 @@ from workbench.diagnosis.judge import (
 )
 from workbench.diagnosis.pair_gains import FACTORS, pair_gains
 from workbench.diagnosis.power import needed
-from workbench.diagnosis.ranking import predicts_row, refitted_row
+from workbench.diagnosis.ranking import grouped, predicts_row, refitted_row
 from workbench.diagnosis.refit import Refit, counted_from, refit, refit_from
 from workbench.diagnosis.result import Ranked
 from workbench.diagnosis.rough import Rough, rough_fit
@@ -59,10 +59,9 @@ def with_pairs(
     rows = {}
     for each in refits:
         name = each.candidate.name
-        tied = tuple(n for n in names if n != name) if name in names else ()
         own = refitted_row(problem, each)
-        rows[name] = replace(own, accepted=not against[name], reasons=against[name], tied_with=tied)
-    accepted = [rows[name] for name in names]
+        rows[name] = replace(own, accepted=not against[name], reasons=against[name])
+    accepted = grouped([rows[name] for name in names])
     refused = [row for name, row in rows.items() if name not in names]
     followed = [row for row in ranking if row.fit is not None]
     rest = [row for row in ranking if row.fit is None]

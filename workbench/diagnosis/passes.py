@@ -230,9 +230,9 @@ def _refitted(problem: Problem, candidate: Candidate) -> Refit | None:
     profiles = scan(
         problem.whole, base.windows, base.unknowns, base.point, [candidate], base.derivatives
     )
-    return (
-        refit_shaken(problem, refit(problem, rough_fit(problem, profiles[0]))) if profiles else None
-    )
+    if not profiles:
+        return None
+    return refit_shaken(problem, refit(problem, rough_fit(problem, profiles[0])))
 
 
 def _shifted(problem: Problem, candidate: Candidate) -> Refit | None:
