@@ -1,11 +1,16 @@
 """What a shift of a gearbox actuator costs, as CasADi functions of one sample and of the last.
 
-    cost = sum dt (d_k + w over_k) + T_end d_N + T_land sum max(|v_k| - v_land, 0)^2
-           + T_land max(v_N - v_safe, 0)^2,   v_safe = v_land - a t + sqrt((a t)^2 + 2 a far_N)
+    cost = sum dt (d_k + w over_k) + T_end d_N + T_land sum off_k^2 + T_land max(v_N - v_safe, 0)^2
+    off_k = max(|v_k| - v_land, v_arr - |v_k|, 0)
+    v_safe = v_land - a t + sqrt((a t)^2 + 2 a far_N)
 
 d grows with the distance that is left of a shift and is 1 for the way from Neutral to an end, and
 ``over`` is what is gone past Neutral; the second sum is over the samples at which the target is
 reached, and v_safe the speed that a brake with deceleration a after a delay t still takes away.
+
+An end that is to be met with less than v_arr is easily missed: a piston whose friction is a little
+larger stands short of it until the pressure has built up again.  At Neutral v_arr is 0, and an end
+is met once, however often the piston bounces.
 """
 
 from __future__ import annotations
@@ -28,6 +33,7 @@ class ShiftCost:
     beyond_m            tolerated past Neutral
     beyond_weight       w, of what is gone further
     landing_m_s         v_land at an end; ``neutral_m_s`` at Neutral
+    arriving_m_s        v_arr, with which an end is to be met at least
     landing_s           T_land, s per (m/s)^2
     end_s               T_end
     brake_m_s2          a
@@ -39,6 +45,7 @@ class ShiftCost:
     beyond_weight: float
     landing_m_s: float
     neutral_m_s: float
+    arriving_m_s: float
     landing_s: float
     end_s: float
     brake_m_s2: float
@@ -60,9 +67,12 @@ def stage_cost(cost: ShiftCost, stroke_m: float, dt: float) -> ca.Function:
     reached = ca.logic_and(before > HIT, far <= HIT)
     returned = ca.logic_and(ca.logic_and(before < -HIT, far >= -HIT), 1.0 - at_stop)
     gentle_m_s = ca.if_else(at_stop, cost.landing_m_s, cost.neutral_m_s)
-    hard = ca.fmax(ca.fabs(speed) - gentle_m_s, 0.0) ** 2 * (cost.landing_s / dt)
-    paid = distance + cost.beyond_weight * beyond + ca.logic_or(reached, returned) * hard
-    return ca.Function("stage", [before, at, speed, query], [paid, far])
+    faint_m_s, met_m_s = at_stop * cost.arriving_m_s, ca.fabs(speed)
+    off_m_s = ca.fmax(ca.fmax(met_m_s - gentle_m_s, faint_m_s - met_m_s), 0.0)
+    met = ca.logic_or(reached, returned) * (cost.landing_s / dt) * off_m_s**2
+    paid = distance + cost.beyond_weight * beyond + met
+    nearest = ca.fmin(far, before + (1.0 - at_stop) * stroke_m * 10.0)
+    return ca.Function("stage", [before, at, speed, query], [paid, nearest])
 
 
 def end_cost(cost: ShiftCost, stroke_m: float, dt: float) -> ca.Function:

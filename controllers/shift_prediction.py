@@ -54,6 +54,12 @@ def shift_prediction(
     )
 
 
+def query(target_m: float, start_m: float) -> np.ndarray:
+    """What a shift from one place to another is asked with, shape (3,)."""
+    side = 1.0 if target_m >= start_m else -1.0
+    return np.array([target_m, side, float(target_m != 0.0)])
+
+
 def drives(plant: Plant, sample_time_s: float) -> dict[float, tuple[int, int]]:
     """By dedicated position the commands of both valves that end there when they are held.
 
@@ -102,22 +108,21 @@ def _linearised(step: ca.Function, horizon: int) -> ca.Function:
 
 def _ranked(stage: ca.Function, end: ca.Function, horizon: int, plans: int) -> ca.Function:
     n = 2 * horizon
-    way, first, second = (ca.SX.sym(k, n) for k in ("way", "first", "second"))
+    begun, second = ca.SX.sym("begun", n), ca.SX.sym("second", n)
     query, x = ca.SX.sym("query", 3), ca.SX.sym("x", 4)
-    at, total = way + first + second, 0.0
+    at, total = begun + second, 0.0
     far = query[1] * (query[0] - x[2])
     for k in range(horizon):
         paid, far = stage(far, at[k], at[horizon + k], query)
         total += paid
-    pair = ca.Function(
-        "pair", [way, first, second, query, x], [ca.cse(total + end(far, at[n - 1], query))]
-    )
+    total += end(far, at[n - 1], query)
+    pair = ca.Function("pair", [begun, second, query, x], [ca.cse(total)])
+    # one map within the other: neither copies the plans of a valve for each of the other's
+    row = pair.map("row", "serial", plans, [0, 2, 3], [])
+    every = row.map("every", "serial", plans, [1, 2, 3], [])
     sizes = ((n, 1), (n, plans), (n, plans), (3, 1), (4, 1))
-    inputs = [ca.MX.sym(f"i{k}", *size) for k, size in enumerate(sizes)]
-    left = np.repeat(np.arange(plans), plans).tolist()
-    right = np.tile(np.arange(plans), plans).tolist()
-    many = pair.map("pairs", "serial", plans**2, [0, 3, 4], [])
-    costs = many(inputs[0], inputs[1][:, left], inputs[2][:, right], *inputs[3:])
+    way, first, *others = inputs = [ca.MX.sym(f"i{k}", *size) for k, size in enumerate(sizes)]
+    costs = every(ca.repmat(way, 1, plans) + first, *others)
     return ca.Function("ranked", inputs, [costs.T])
 
 

@@ -11,7 +11,7 @@ from functools import cache
 
 import numpy as np
 
-from linearize.valve_response import packed
+from linearize.valve_response import ValveResponse, packed
 
 INSTANTS = (0, 1, 2, 4, 7, 10, 14)  # samples ahead, fine where a plan is about to be carried out
 NEVER = 1e6  # switches of what only fills up a set: it is never chosen
@@ -51,3 +51,24 @@ def switching_times(wait: int, hold: int) -> list[tuple[int, ...]]:
     allowed = sorted({max(k, wait) for k in INSTANTS})
     twice = [(first, then) for first in allowed for then in allowed if then - first >= hold]
     return [(), *((k,) for k in allowed), *twice]
+
+
+def moved(
+    responses: tuple[ValveResponse, ValveResponse], sent: tuple[int, int], plan: np.ndarray
+) -> np.ndarray:
+    """A plan of both valves with one switch a sample or two earlier or later, shape (n, 2, N)."""
+    found = []
+    for valve, (response, s) in enumerate(zip(responses, sent, strict=True)):
+        flipped = plan[valve] ^ flips(plan.shape[1])
+        rows = flipped[response.keeps(s, packed(flipped))]
+        plans_of_both = np.repeat(plan[None], len(rows), axis=0)
+        plans_of_both[:, valve] = rows
+        found.append(plans_of_both)
+    return np.concatenate(found)
+
+
+@cache
+def flips(horizon: int) -> np.ndarray:
+    """One command and two following ones, 1 where they change, shape (2 N - 1, N)."""
+    one = np.eye(horizon, dtype=int)
+    return np.concatenate([one, one[:-1] + one[1:]])

@@ -90,7 +90,7 @@ def certificate_text(found: Certificate) -> str:
 
 def search_text(made: HybridMpc) -> str:
     """What a hybrid MPC searches, and where each pair of held commands leads."""
-    spec, pairs = made.spec, len(made.plans(0).switches) ** 2
+    spec, pairs = made.spec, len(made.search.plans(0).switches) ** 2
     held = number(1e3 * spec.hold_s, 3)
     lines = [f"of {pairs} pairs of plans over {spec.horizon} samples, {held} ms between switches:"]
     lines.append(

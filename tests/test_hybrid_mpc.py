@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from controllers.design_file import design, read_design, write_design
-from controllers.hybrid_mpc import HybridMpcSpec, flips
-from controllers.switching_plans import NEVER, plans, switching_times
+from controllers.hybrid_mpc import HybridMpcSpec
+from controllers.switching_plans import NEVER, flips, plans, switching_times
 from linearize.shift_sample import half_stroke_m, one_sample, softened
 from linearize.shifting import STATES
 from linearize.valve_response import MASK, admissible, age, packed, valve_response
@@ -117,15 +117,15 @@ def test_the_affine_modes_along_a_plan_cost_what_the_nonlinear_model_does(made):
     horizon = HybridMpcSpec().horizon
     plan = np.zeros((2, horizon), dtype=int)
     plan[1] = 1  # towards Low, which it does not reach within the horizon
-    query, count = np.array([-12e-3, -1.0, 1.0]), len(made.plans(0).switches)
+    query, count = np.array([-12e-3, -1.0, 1.0]), len(made.search.plans(0).switches)
     shares = np.array(
-        [r.ahead(0, packed(row)) for r, row in zip(made.responses, plan, strict=True)]
+        [r.ahead(0, packed(row)) for r, row in zip(made.search.responses, plan, strict=True)]
     )
-    way, _ = called(made.prediction.linearised, VENTED, shares)
+    way, _ = called(made.search.prediction.linearised, VENTED, shares)
     nothing = np.zeros((2 * horizon, count))
-    ranked = called(made.prediction.ranked, way, nothing, nothing, query, VENTED)[0]
+    ranked = called(made.search.prediction.ranked, way, nothing, nothing, query, VENTED)[0]
     many = np.tile(shares, (1, made.spec.judged + 1))
-    judged = called(made.prediction.judged, VENTED, many, query)[0]
+    judged = called(made.search.prediction.judged, VENTED, many, query)[0]
 
     assert ranked == pytest.approx(np.full(ranked.shape, judged[0, 0]), rel=1e-9)
 
@@ -134,11 +134,11 @@ def test_the_slopes_along_a_plan_are_those_of_the_nonlinear_model(made):
     horizon = HybridMpcSpec().horizon
     shares = np.full((2, horizon), 0.5)
     x = np.array([4e5, 3e5, -6e-3, 0.5])
-    way, slope = called(made.prediction.linearised, x, shares)
+    way, slope = called(made.search.prediction.linearised, x, shares)
     for valve, sample in ((0, 2), (1, 7)):
         moved = shares.copy()
         moved[valve, sample] += 1e-6
-        change = (called(made.prediction.linearised, x, moved)[0] - way)[:15, 0] / 1e-6
+        change = (called(made.search.prediction.linearised, x, moved)[0] - way)[:15, 0] / 1e-6
 
         assert slope[:15, valve * horizon + sample] == pytest.approx(change, rel=1e-3, abs=1e-7)
 

@@ -1,0 +1,139 @@
+"""Which plan of two switching valves costs least, of as many as one sample has time for.
+
+Plans, none of which switches sooner than a valve may, are commands ahead, shape (2, N).  Asked are
+
+- the plans that were best a sample ago, by now shifted: another way to the target is not forgotten
+  while it is a little dearer;
+- no switch at all, and what the caller suggests;
+- the best plan of a sample ago with one switch moved by a sample or two;
+- of all pairs of blocked plans the best under the affine modes along it, ranked exactly.
+
+The nonlinear model judges each, so a plan is only changed for one that this prefers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from controllers.shift_prediction import ShiftPrediction
+from controllers.switching_plans import Plans, moved, plans
+from linearize.valve_response import ValveResponse, age, packed
+from workbench.called import prepared
+
+KEPT = 8  # plans that a sample hands on to the next
+RANKED = 4  # plans at least that come from the affine modes
+
+
+@dataclass(frozen=True)
+class PlanSearch:
+    """What is searched, and how much of it.
+
+    horizon     N, samples
+    judged      plans that the nonlinear model judges at each sample, besides the last one
+    price       of a switch, in samples of the whole way
+    """
+
+    responses: tuple[ValveResponse, ValveResponse]
+    prediction: ShiftPrediction
+    horizon: int
+    judged: int
+    price: float
+
+    def best(
+        self,
+        x: np.ndarray,
+        query: np.ndarray,
+        sent: tuple[int, int],
+        before: np.ndarray,
+        suggested: np.ndarray,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Plans, shape (k, 2, N), and their costs in samples, rising.
+
+        ``before`` are those of the last sample, shifted, the best first, shape (k, 2, N), and
+        ``suggested`` one more, shape (2, N); see :class:`ShiftPrediction` for the query.
+        """
+        others = before[1:][self.keep(sent, before[1:])]
+        held = np.repeat([[s & 1] for s in sent], self.horizon, axis=1)
+        known = [before[:1], others, held[None], suggested[None]]
+        near = np.concatenate([*known, moved(self.responses, sent, before[0])])
+        near = near[: self.judged + 1 - RANKED]
+        ranked = self._ranked(x, query, sent, before[0])[: self.judged + 1 - len(near)]
+        asked = np.concatenate([near, ranked])
+        costs = self.costs(x, query, sent, asked)
+        order = _distinct(asked, np.argsort(costs, kind="stable"))[:KEPT]
+        return asked[order], costs[order]
+
+    def costs(
+        self, x: np.ndarray, query: np.ndarray, sent: tuple[int, int], asked: np.ndarray
+    ) -> np.ndarray:
+        """Costs of plans by the nonlinear model, shape (n,); n is a multiple of judged + 1."""
+        size = self.judged + 1
+        shares = np.stack(self._shares(sent, asked.transpose(1, 0, 2)), axis=-1)
+        parts = [
+            self._calls[2](x, part.ravel(), query)[0]
+            for part in shares.reshape(-1, size * self.horizon * 2)
+        ]
+        standing = np.broadcast_to([[s & 1] for s in sent], (len(asked), 2, 1))
+        switches = np.abs(np.diff(asked, axis=2, prepend=standing)).sum(axis=(1, 2))
+        costs = np.concatenate(parts) + self.price * switches
+        costs[~np.isfinite(costs)] = np.inf
+        return costs
+
+    def keep(self, sent: tuple[int, int], asked: np.ndarray) -> np.ndarray:
+        """True for each plan that switches no valve sooner than it may, shape (n,)."""
+        pairs = zip(self.responses, sent, range(2), strict=True)
+        both = [response.keeps(s, packed(asked[:, valve])) for response, s, valve in pairs]
+        return both[0] & both[1]
+
+    def plans(self, sent: int) -> Plans:
+        """The blocked plans of one valve after these commands."""
+        hold = self.responses[0].hold
+        return plans(sent & 1, max(hold - age(sent), 0), hold, self.horizon)
+
+    def _ranked(
+        self, x: np.ndarray, query: np.ndarray, sent: tuple[int, int], before: np.ndarray
+    ) -> np.ndarray:
+        """The best pairs of plans under the modes along the last plan, shape (judged, 2, N)."""
+        N, both = self.horizon, [self.plans(s) for s in sent]
+        along = np.array(self._shares(sent, before))
+        way, columns = self._calls[0](x, along.T.ravel())
+        by_share = columns.reshape(2 * N, 2 * N)  # a row for each share, as CasADi stores columns
+        moves = [
+            ((response.ahead(s, p.packed) - along[v]) @ by_share[N * v : N * (v + 1)]).ravel()
+            for v, (response, s, p) in enumerate(zip(self.responses, sent, both, strict=True))
+        ]
+        (costs,) = self._calls[1](way, *moves, query, x)
+        costs += self.price * np.add.outer(*(p.switches for p in both)).ravel()
+        costs[~np.isfinite(costs)] = np.inf
+        chosen = np.argpartition(costs, self.judged)[: self.judged]
+        chosen = chosen[np.argsort(costs[chosen])]
+        picked = np.divmod(chosen, len(both[0].switches))
+        pairs = [p.commands[k] for p, k in zip(both, picked, strict=True)]
+        return np.stack(pairs, axis=1)
+
+    def _shares(self, sent: tuple[int, int], commands: np.ndarray) -> list[np.ndarray]:
+        """Shares of each valve under commands of shape (2, ..., N)."""
+        pairs = zip(self.responses, sent, commands, strict=True)
+        return [response.ahead(s, packed(ahead)) for response, s, ahead in pairs]
+
+    @cached_property
+    def _calls(self) -> tuple[Callable[..., list[np.ndarray]], ...]:
+        """The functions of the prediction, ready to be called at every sample."""
+        found = self.prediction
+        return tuple(prepared(f) for f in (found.linearised, found.ranked, found.judged))
+
+    def __getstate__(self) -> dict[str, object]:
+        """Without what another process makes anew."""
+        return {key: value for key, value in self.__dict__.items() if key != "_calls"}
+
+
+def _distinct(asked: np.ndarray, order: np.ndarray) -> np.ndarray:
+    """The order without what stands earlier in it too."""
+    seen: dict[bytes, int] = {}
+    for k in order:
+        seen.setdefault(asked[k].tobytes(), k)
+    return np.array([*seen.values()])

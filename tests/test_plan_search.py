@@ -1,0 +1,137 @@
+"""What hybrid MPC searches at each sample and with the design, and what an arrival costs."""
+
+import numpy as np
+import pytest
+
+from controllers.design_file import design
+from controllers.hybrid_mpc import HybridMpcSpec
+from controllers.launches import RELEASED, pulse_pairs
+from controllers.plan_search import KEPT
+from controllers.shift_cost import stage_cost
+from controllers.shift_prediction import query
+from controllers.switching_plans import moved
+from linearize.shifting import STATES
+from studies.gear_shift_study import _truth
+from studies.shift_check import check_shifts
+from workbench.called import called
+from workbench.plants.gearbox import gearbox
+
+HOLD, N = 4, 26
+END_M = 12e-3
+
+
+@pytest.fixture(scope="module")
+def made():
+    return design("hybrid-mpc", gearbox()).controller
+
+
+def rest(place_m):
+    x = np.array([1.013e5, 1.013e5, 0.0, 0.0])
+    x[STATES.index("main_piston.position_m")] = place_m
+    return x
+
+
+def costs(made, start_m, target_m, plans):
+    """Of any number of plans from rest, one call each."""
+    size = made.spec.judged + 1
+    asked = query(target_m, start_m)
+    return np.array(
+        [made.search.costs(rest(start_m), asked, RELEASED, np.stack([p] * size))[0] for p in plans]
+    )
+
+
+def keeps_hold(plan):
+    return all(
+        (np.diff([-HOLD, *np.flatnonzero(np.diff([0, *row]))]) >= HOLD).all() for row in plan
+    )
+
+
+def test_pulses_are_tried_at_once_and_keep_the_least_time():
+    found = pulse_pairs(HOLD, N)
+
+    assert (found[:, :, 0].any(axis=1)).all()
+    assert all(keeps_hold(plan) for plan in found)
+    assert len(np.unique(found.reshape(len(found), -1), axis=0)) == len(found)
+
+
+@pytest.mark.parametrize(("start_m", "target_m"), [(-END_M, 0.0), (END_M, 0.0), (0.0, END_M)])
+def test_no_plan_near_the_launch_and_no_pair_of_pulses_costs_less(made, start_m, target_m):
+    plans = made.launches[start_m, target_m]
+    found = costs(made, start_m, target_m, plans)
+    near = moved(made.search.responses, RELEASED, plans[0])
+    pairs = pulse_pairs(HOLD, N)[::97]
+
+    assert all(keeps_hold(plan) for plan in plans)
+    assert found == pytest.approx(np.sort(found))
+    assert costs(made, start_m, target_m, near).min() >= found[0]
+    assert costs(made, start_m, target_m, pairs).min() >= found[0]
+    assert costs(made, start_m, target_m, [made._full_drive(target_m, RELEASED)])[0] > found[0]
+
+
+def test_a_sample_hands_on_different_plans_by_rising_cost(made):
+    x, asked = np.array([2e5, 1.2e5, -9e-3, 0.5]), query(0.0, -END_M)
+    sent = (0b111111, 0)
+    before = np.stack([np.ones((2, N), dtype=int), np.zeros((2, N), dtype=int)])
+    plans, cost = made.search.best(x, asked, sent, before, made._full_drive(0.0, sent))
+
+    assert 1 < len(plans) <= KEPT
+    assert (np.diff(cost) >= 0.0).all()
+    assert len(np.unique(plans.reshape(len(plans), -1), axis=0)) == len(plans)
+    assert made.search.keep(sent, plans).all()
+
+
+def test_what_may_not_be_switched_yet_is_no_plan(made):
+    sent = (1, 0)  # valve 1 was energised a sample ago
+    plan = np.zeros((2, N), dtype=int)
+
+    assert not made.search.keep(sent, plan[None]).any()
+    plan[0, : HOLD - 1] = 1
+    assert made.search.keep(sent, plan[None]).all()
+
+
+def test_a_pair_is_ranked_by_the_sum_of_both_ways(made):
+    number = len(made.search.plans(0).switches)
+    random = np.random.default_rng(3)
+    way = np.concatenate([np.linspace(-11e-3, -2e-3, N), np.full(N, 0.4)])
+    first, second = 1e-3 * random.standard_normal((2, 2 * N, number))
+    nothing, x, asked = np.zeros((2 * N, number)), rest(-END_M), query(0.0, -END_M)
+    ranked = called(made.search.prediction.ranked, way, first, second, asked, x)[0].ravel()
+    for i, j in ((0, 0), (3, 8), (8, 3)):
+        moved_way = way + first[:, i] + second[:, j]
+        alone = called(made.search.prediction.ranked, moved_way, nothing, nothing, asked, x)[0]
+
+        assert ranked[number * i + j] == pytest.approx(alone.ravel()[0], rel=1e-9)
+
+
+@pytest.mark.parametrize(("at_stop", "too_slow"), [(1.0, True), (0.0, False)])
+def test_an_end_is_to_be_met_neither_hard_nor_faintly(at_stop, too_slow):
+    spec = HybridMpcSpec()
+    stage = stage_cost(spec.cost, END_M, 1e-3)
+    asked = np.array([END_M * at_stop, 1.0, at_stop])
+
+    def paid(speed_m_s):
+        return float(stage(1e-3, END_M * at_stop, speed_m_s, asked)[0])
+
+    between = 0.5 * (spec.arriving_m_s + spec.neutral_m_s)
+    assert paid(between) == pytest.approx(0.0)
+    assert paid(1.0) > 1.0
+    assert (paid(0.05) > 1.0) == too_slow
+
+
+def test_an_end_is_met_once_however_the_piston_bounces():
+    stage = stage_cost(HybridMpcSpec().cost, END_M, 1e-3)
+    asked = np.array([END_M, 1.0, 1.0])
+    _, nearest = stage(1e-3, END_M, 0.4, asked)
+    _, bounced = stage(nearest, END_M - 2e-4, -0.05, asked)
+    paid, _ = stage(bounced, END_M, 0.05, asked)
+
+    assert float(paid) == pytest.approx(0.0)
+
+
+def test_a_shift_that_stalled_half_way_without_its_launch_is_made():
+    """Draw 10 of the study: 50 ms instead of at most 46, by a first pulse that was too short."""
+    plant = _truth(9)
+    controller = design("hybrid-mpc", plant).controller
+    (row,) = check_shifts(plant, {"mpc": controller}, ["l-n"], seed=9).rows
+
+    assert row.reached and row.settling_s < 0.6 * row.longest_s
