@@ -66,10 +66,11 @@ class HybridMpcSpec:
     horizon: int = ranged(26, least=16, most=60)
     hold_s: float = ranged(4e-3, least=3e-3, most=2e-2)
     within_m: float = 1e-4
-    beyond_m: float = 2.5e-4
+    beyond_m: float = 2e-4
     beyond_weight: float = 240.0
+    beyond_later: float = ranged(0.2, most=1.0)
     landing_m_s: float = 0.6
-    neutral_m_s: float = 0.4
+    neutral_m_s: float = 0.35
     arriving_m_s: float = 0.3
     landing_s: float = 0.04
     end_s: float = 5e-3
@@ -91,13 +92,14 @@ class ShiftMemory:
 
     sent        the last commands of each valve as integers, the newest lowest
     plans       commands from the last sample on, shape (k, 2, N), the best first
-    start_m, target_m    where the shift begins and ends
+    start_m, target_m    where the shift begins and ends, and ``turn``, its samples so far
     """
 
     sent: tuple[int, int] = (0, 0)
     plans: np.ndarray | None = None
     start_m: float = 0.0
     target_m: float | None = None
+    turn: int = 0
 
     @property
     def plan(self) -> np.ndarray:
@@ -132,7 +134,9 @@ class HybridMpc:
         plans, notes = self._searched(x, memory, shifted)
         now = plans[0, :, 0]
         sent = tuple((s << 1 | int(u)) & MASK for s, u in zip(memory.sent, now, strict=True))
-        return Command(now.astype(float), replace(memory, sent=sent, plans=plans), notes)
+        return Command(
+            now.astype(float), replace(memory, sent=sent, plans=plans, turn=memory.turn + 1), notes
+        )
 
     def _searched(
         self, x: np.ndarray, memory: ShiftMemory, shifted: np.ndarray
@@ -142,7 +146,7 @@ class HybridMpc:
             return shifted, {"fallback": 1.0}
         full = self._full_drive(memory.target_m, memory.sent)
         asked_for = query(memory.target_m, memory.start_m)
-        plans, costs = self.search.best(x, asked_for, memory.sent, shifted, full)
+        plans, costs = self.search.best(x, asked_for, memory.sent, shifted, full, memory.turn)
         changed = float((plans[0] != shifted[0]).any())
         cost_s = float(costs[0]) * self.sample_time_s
         return plans, {"cost_s": cost_s, "changed": changed, "fallback": 0.0}
@@ -160,7 +164,7 @@ class HybridMpc:
         plans = known[self.search.keep(memory.sent, known)]
         last = np.broadcast_to([[s & 1] for s in memory.sent], (len(plans), 2, 1))
         plans = np.concatenate([last, plans[:, :, :-1]], axis=2)
-        return replace(memory, plans=plans, start_m=place_m, target_m=target_m)
+        return replace(memory, plans=plans, start_m=place_m, target_m=target_m, turn=0)
 
     def _full_drive(self, target_m: float, sent: tuple[int, int]) -> np.ndarray:
         """Both valves as soon as they may as they end at the target, shape (2, N)."""

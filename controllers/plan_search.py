@@ -6,7 +6,10 @@ Plans, none of which switches sooner than a valve may, are commands ahead, shape
   while it is a little dearer;
 - no switch at all, and what the caller suggests;
 - the best plan of a sample ago with one switch moved by a sample or two;
-- of all pairs of blocked plans the best under the affine modes along it, ranked exactly.
+- of all pairs of blocked plans the best under the affine modes along it, ranked exactly;
+- on the way to Neutral, at every second sample instead of these, plans from all over those of two
+  switches per valve: far from a poor plan its modes tell nothing of a good one, and a brake that
+  comes too early leaves the piston half-way.
 
 The nonlinear model judges each, so a plan is only changed for one that this prefers.
 """
@@ -20,12 +23,13 @@ from functools import cached_property
 import numpy as np
 
 from controllers.shift_prediction import ShiftPrediction
-from controllers.switching_plans import Plans, moved, plans
+from controllers.switching_plans import Plans, every_plan, moved, plans
 from linearize.valve_response import ValveResponse, age, packed
 from workbench.called import prepared
 
 KEPT = 8  # plans that a sample hands on to the next
 RANKED = 4  # plans at least that come from the affine modes
+GOLDEN = 0.5 * (5.0**0.5 - 1.0)  # its multiples fill an interval evenly, however many are taken
 
 
 @dataclass(frozen=True)
@@ -50,19 +54,25 @@ class PlanSearch:
         sent: tuple[int, int],
         before: np.ndarray,
         suggested: np.ndarray,
+        turn: int,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Plans, shape (k, 2, N), and their costs in samples, rising.
 
         ``before`` are those of the last sample, shifted, the best first, shape (k, 2, N), and
-        ``suggested`` one more, shape (2, N); see :class:`ShiftPrediction` for the query.
+        ``suggested`` one more, shape (2, N); see :class:`ShiftPrediction` for the query.  ``turn``
+        counts the samples of a shift.
         """
         others = before[1:][self.keep(sent, before[1:])]
         held = np.repeat([[s & 1] for s in sent], self.horizon, axis=1)
         known = [before[:1], others, held[None], suggested[None]]
         near = np.concatenate([*known, moved(self.responses, sent, before[0])])
         near = near[: self.judged + 1 - RANKED]
-        ranked = self._ranked(x, query, sent, before[0])[: self.judged + 1 - len(near)]
-        asked = np.concatenate([near, ranked])
+        left = self.judged + 1 - len(near)
+        if turn % 2 and not query[2]:
+            far = self._spread(sent, turn, left + self.judged + 1)
+        else:
+            far = self._ranked(x, query, sent, before[0])[:left]
+        asked = np.concatenate([near, far])
         costs = self.costs(x, query, sent, asked)
         order = _distinct(asked, np.argsort(costs, kind="stable"))[:KEPT]
         return asked[order], costs[order]
@@ -114,6 +124,14 @@ class PlanSearch:
         picked = np.divmod(chosen, len(both[0].switches))
         pairs = [p.commands[k] for p, k in zip(both, picked, strict=True)]
         return np.stack(pairs, axis=1)
+
+    def _spread(self, sent: tuple[int, int], turn: int, number: int) -> np.ndarray:
+        """So many of all pairs of plans, others at each turn, shape (number, 2, N)."""
+        hold = self.responses[0].hold
+        rows = [every_plan(s & 1, max(hold - age(s), 0), hold, self.horizon) for s in sent]
+        places = (turn * number + np.arange(number)) * GOLDEN % 1.0
+        picked = np.divmod((places * len(rows[0]) * len(rows[1])).astype(int), len(rows[1]))
+        return np.stack([row[k] for row, k in zip(rows, picked, strict=True)], axis=1)
 
     def _shares(self, sent: tuple[int, int], commands: np.ndarray) -> list[np.ndarray]:
         """Shares of each valve under commands of shape (2, ..., N)."""

@@ -1,8 +1,8 @@
 """What a shift of a gearbox actuator costs, as CasADi functions of one sample and of the last.
 
-    cost = sum dt (d_k + w over_k) + T_end d_N + T_land sum off_k^2 + T_land max(v_N - v_safe, 0)^2
+    cost = sum dt (d_k + w_k over_k) + T_end d_N + T_land (sum off_k^2 + fast^2)
     off_k = max(|v_k| - v_land, v_arr - |v_k|, 0)
-    v_safe = v_land - a t + sqrt((a t)^2 + 2 a far_N)
+    fast = max(v_N - v_safe, 0),  v_safe = v_land - a t + sqrt((a t)^2 + 2 a far_N)
 
 d grows with the distance that is left of a shift and is 1 for the way from Neutral to an end, and
 ``over`` is what is gone past Neutral; the second sum is over the samples at which the target is
@@ -18,6 +18,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import casadi as ca
+import numpy as np
 
 HIT = 1e-9
 LAST_BIT, LAST_BIT_TO_STOP = 0.25, 0.6
@@ -31,7 +32,7 @@ class ShiftCost:
 
     within_m            distance from the target that costs nothing
     beyond_m            tolerated past Neutral
-    beyond_weight       w, of what is gone further
+    beyond_weight       w_1, of what is gone further; ``beyond_later`` the share w_N of it
     landing_m_s         v_land at an end; ``neutral_m_s`` at Neutral
     arriving_m_s        v_arr, with which an end is to be met at least
     landing_s           T_land, s per (m/s)^2
@@ -43,6 +44,7 @@ class ShiftCost:
     within_m: float
     beyond_m: float
     beyond_weight: float
+    beyond_later: float
     landing_m_s: float
     neutral_m_s: float
     arriving_m_s: float
@@ -53,13 +55,10 @@ class ShiftCost:
 
 
 def stage_cost(cost: ShiftCost, stroke_m: float, dt: float) -> ca.Function:
-    """(far before, position, velocity, query) -> (cost in samples, far)."""
-    before, at, speed, query = (
-        ca.SX.sym("before"),
-        ca.SX.sym("x"),
-        ca.SX.sym("v"),
-        ca.SX.sym("q", 3),
-    )
+    """(far before, position, velocity, query, w of the sample) -> (cost in samples, far)."""
+    names = ("before", "x", "v", "w")
+    before, at, speed, weight = (ca.SX.sym(name) for name in names)
+    query = ca.SX.sym("q", 3)
     target, side, at_stop = ca.vertsplit(query)
     far = side * (target - at)
     distance = _distance(cost, stroke_m, far, at_stop)
@@ -70,9 +69,17 @@ def stage_cost(cost: ShiftCost, stroke_m: float, dt: float) -> ca.Function:
     faint_m_s, met_m_s = at_stop * cost.arriving_m_s, ca.fabs(speed)
     off_m_s = ca.fmax(ca.fmax(met_m_s - gentle_m_s, faint_m_s - met_m_s), 0.0)
     met = ca.logic_or(reached, returned) * (cost.landing_s / dt) * off_m_s**2
-    paid = distance + cost.beyond_weight * beyond + met
+    paid = distance + weight * beyond + met
     nearest = ca.fmin(far, before + (1.0 - at_stop) * stroke_m * 10.0)
-    return ca.Function("stage", [before, at, speed, query], [paid, nearest])
+    return ca.Function("stage", [before, at, speed, query, weight], [paid, nearest])
+
+
+def beyond_weights(cost: ShiftCost, horizon: int) -> np.ndarray:
+    """The weight w of each sample of the horizon, shape (N,).
+
+    It falls: what is seen to go past Neutral later can still be mended.
+    """
+    return cost.beyond_weight * np.linspace(1.0, cost.beyond_later, horizon)
 
 
 def end_cost(cost: ShiftCost, stroke_m: float, dt: float) -> ca.Function:

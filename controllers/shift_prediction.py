@@ -13,7 +13,7 @@ from itertools import product
 import casadi as ca
 import numpy as np
 
-from controllers.shift_cost import ShiftCost, end_cost, stage_cost
+from controllers.shift_cost import ShiftCost, beyond_weights, end_cost, stage_cost
 from linearize.shift_sample import half_stroke_m, one_sample, softened
 from linearize.shifting import POSITION
 from workbench.compiled import compiled
@@ -45,12 +45,13 @@ def shift_prediction(
     """The functions for ``horizon`` samples, ``plans`` of each valve, ``kept`` pairs to judge."""
     model, stroke_m = softened(plant), half_stroke_m(plant)
     stage, end = stage_cost(cost, stroke_m, sample_time_s), end_cost(cost, stroke_m, sample_time_s)
+    weights = beyond_weights(cost, horizon)
     stopped = one_sample(model, stroke_m, sample_time_s, stops=True)
     free = one_sample(model, stroke_m, sample_time_s, stops=False)
     return ShiftPrediction(
         linearised=compiled(_linearised(free, horizon)),
-        ranked=compiled(_ranked(stage, end, horizon, plans)),
-        judged=compiled(_judged(stopped, stage, end, horizon, kept)),
+        ranked=compiled(_ranked(stage, end, weights, plans)),
+        judged=compiled(_judged(stopped, stage, end, weights, kept)),
     )
 
 
@@ -106,14 +107,15 @@ def _linearised(step: ca.Function, horizon: int) -> ca.Function:
     return ca.Function("linearised", [start, shares], [places, steep])
 
 
-def _ranked(stage: ca.Function, end: ca.Function, horizon: int, plans: int) -> ca.Function:
+def _ranked(stage: ca.Function, end: ca.Function, weights: np.ndarray, plans: int) -> ca.Function:
+    horizon = len(weights)
     n = 2 * horizon
     begun, second = ca.SX.sym("begun", n), ca.SX.sym("second", n)
     query, x = ca.SX.sym("query", 3), ca.SX.sym("x", 4)
     at, total = begun + second, 0.0
     far = query[1] * (query[0] - x[2])
     for k in range(horizon):
-        paid, far = stage(far, at[k], at[horizon + k], query)
+        paid, far = stage(far, at[k], at[horizon + k], query, weights[k])
         total += paid
     total += end(far, at[n - 1], query)
     pair = ca.Function("pair", [begun, second, query, x], [ca.cse(total)])
@@ -127,19 +129,20 @@ def _ranked(stage: ca.Function, end: ca.Function, horizon: int, plans: int) -> c
 
 
 def _judged(
-    step: ca.Function, stage: ca.Function, end: ca.Function, horizon: int, kept: int
+    step: ca.Function, stage: ca.Function, end: ca.Function, weights: np.ndarray, kept: int
 ) -> ca.Function:
+    horizon, weight = len(weights), ca.SX.sym("weight")
     x, share, query = ca.SX.sym("x", 4), ca.SX.sym("share", 2), ca.SX.sym("query", 3)
     far, total = ca.SX.sym("far"), ca.SX.sym("total")
     later, met_m_s = step(x, share)
-    paid, left = stage(far, later[2], met_m_s, query)
+    paid, left = stage(far, later[2], met_m_s, query, weight)
     memory = ca.vertcat(x, far, total)
     result = ca.vertcat(later, left, total + paid)
-    one = ca.Function("one", [memory, share, query], [result])
+    one = ca.Function("one", [memory, share, query, weight], [result])
     start, shares = ca.MX.sym("x", 4), ca.MX.sym("shares", 2, horizon)
     asked = ca.MX.sym("query", 3)
     begun = ca.vertcat(start, asked[1] * (asked[0] - start[2]), 0.0)
-    done = one.fold(horizon)(begun, shares, ca.repmat(asked, 1, horizon))
+    done = one.fold(horizon)(begun, shares, ca.repmat(asked, 1, horizon), ca.DM(weights).T)
     plan = ca.Function("plan", [start, shares, asked], [done[5] + end(done[4], done[3], asked)])
     many = plan.map("plans", "serial", kept, [0, 2], [])
     inputs = [start, ca.MX.sym("all", 2, horizon * kept), asked]

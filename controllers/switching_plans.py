@@ -6,6 +6,7 @@ it does, only on what it foresees.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 
@@ -35,20 +36,29 @@ class Plans:
 def plans(level: int, wait: int, hold: int, horizon: int) -> Plans:
     """Plans of a valve whose command is ``level``, and may first change after ``wait`` samples."""
     times, size = switching_times(wait, hold), len(switching_times(0, hold))
-    times += [()] * (size - len(times))
-    commands = np.full((size, horizon), level)
-    for row, switched in zip(commands, times, strict=True):
-        for k in switched:
-            row[k:] = 1 - row[k:]
-    switches = np.array([float(len(t)) for t in times])
-    real = len(switching_times(wait, hold))
-    switches[real:] = NEVER
+    commands = _commands(level, [*times, *[()] * (size - len(times))], horizon)
+    switches = np.array([float(len(t)) for t in times] + [NEVER] * (size - len(times)))
     return Plans(commands, packed(commands), switches)
 
 
-def switching_times(wait: int, hold: int) -> list[tuple[int, ...]]:
+@cache
+def every_plan(level: int, wait: int, hold: int, horizon: int) -> np.ndarray:
+    """The same without blocking: two switches at most, at any sample, shape (n, N)."""
+    return _commands(level, switching_times(wait, hold, range(horizon)), horizon)
+
+
+def _commands(level: int, times: Iterable[tuple[int, ...]], horizon: int) -> np.ndarray:
+    """Commands that begin at ``level`` and change at these times, shape (n, N)."""
+    first, second = np.array([(*t, horizon, horizon)[:2] for t in times]).T[:, :, None]
+    ahead = np.arange(horizon)
+    return ((ahead >= first) ^ (ahead >= second)).astype(int) ^ level
+
+
+def switching_times(
+    wait: int, hold: int, instants: Iterable[int] = INSTANTS
+) -> list[tuple[int, ...]]:
     """No switch, one, and two at least ``hold`` samples apart; none before ``wait``."""
-    allowed = sorted({max(k, wait) for k in INSTANTS})
+    allowed = sorted({max(k, wait) for k in instants})
     twice = [(first, then) for first in allowed for then in allowed if then - first >= hold]
     return [(), *((k,) for k in allowed), *twice]
 

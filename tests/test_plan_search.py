@@ -9,7 +9,7 @@ from controllers.launches import RELEASED, pulse_pairs
 from controllers.plan_search import KEPT
 from controllers.shift_cost import stage_cost
 from controllers.shift_prediction import query
-from controllers.switching_plans import moved
+from controllers.switching_plans import every_plan, moved
 from linearize.shifting import STATES
 from studies.gear_shift_study import _truth
 from studies.shift_check import check_shifts
@@ -68,11 +68,12 @@ def test_no_plan_near_the_launch_and_no_pair_of_pulses_costs_less(made, start_m,
     assert costs(made, start_m, target_m, [made._full_drive(target_m, RELEASED)])[0] > found[0]
 
 
-def test_a_sample_hands_on_different_plans_by_rising_cost(made):
+@pytest.mark.parametrize("turn", [0, 1])
+def test_a_sample_hands_on_different_plans_by_rising_cost(made, turn):
     x, asked = np.array([2e5, 1.2e5, -9e-3, 0.5]), query(0.0, -END_M)
     sent = (0b111111, 0)
     before = np.stack([np.ones((2, N), dtype=int), np.zeros((2, N), dtype=int)])
-    plans, cost = made.search.best(x, asked, sent, before, made._full_drive(0.0, sent))
+    plans, cost = made.search.best(x, asked, sent, before, made._full_drive(0.0, sent), turn)
 
     assert 1 < len(plans) <= KEPT
     assert (np.diff(cost) >= 0.0).all()
@@ -106,11 +107,11 @@ def test_a_pair_is_ranked_by_the_sum_of_both_ways(made):
 @pytest.mark.parametrize(("at_stop", "too_slow"), [(1.0, True), (0.0, False)])
 def test_an_end_is_to_be_met_neither_hard_nor_faintly(at_stop, too_slow):
     spec = HybridMpcSpec()
-    stage = stage_cost(spec.cost, END_M, 1e-3)
+    stage, weight = stage_cost(spec.cost, END_M, 1e-3), spec.beyond_weight
     asked = np.array([END_M * at_stop, 1.0, at_stop])
 
     def paid(speed_m_s):
-        return float(stage(1e-3, END_M * at_stop, speed_m_s, asked)[0])
+        return float(stage(1e-3, END_M * at_stop, speed_m_s, asked, weight)[0])
 
     between = 0.5 * (spec.arriving_m_s + spec.neutral_m_s)
     assert paid(between) == pytest.approx(0.0)
@@ -121,9 +122,9 @@ def test_an_end_is_to_be_met_neither_hard_nor_faintly(at_stop, too_slow):
 def test_an_end_is_met_once_however_the_piston_bounces():
     stage = stage_cost(HybridMpcSpec().cost, END_M, 1e-3)
     asked = np.array([END_M, 1.0, 1.0])
-    _, nearest = stage(1e-3, END_M, 0.4, asked)
-    _, bounced = stage(nearest, END_M - 2e-4, -0.05, asked)
-    paid, _ = stage(bounced, END_M, 0.05, asked)
+    _, nearest = stage(1e-3, END_M, 0.4, asked, 1.0)
+    _, bounced = stage(nearest, END_M - 2e-4, -0.05, asked, 1.0)
+    paid, _ = stage(bounced, END_M, 0.05, asked, 1.0)
 
     assert float(paid) == pytest.approx(0.0)
 
@@ -135,3 +136,23 @@ def test_a_shift_that_stalled_half_way_without_its_launch_is_made():
     (row,) = check_shifts(plant, {"mpc": controller}, ["l-n"], seed=9).rows
 
     assert row.reached and row.settling_s < 0.6 * row.longest_s
+
+
+def test_every_plan_switches_twice_at_most_at_any_sample_and_none_is_twice_there():
+    found = every_plan(1, 2, HOLD, N)
+
+    assert len(np.unique(found, axis=0)) == len(found)
+    assert (found[:, :2] == 1).all()
+    for row in found:
+        changes = np.flatnonzero(np.diff([1, *row]))
+        assert len(changes) <= 2 and (np.diff(changes) >= HOLD).all()
+    times = N - 2
+    assert len(found) == 1 + times + (times - HOLD) * (times - HOLD + 1) // 2
+
+
+def test_turns_spread_over_other_plans(made):
+    first, second = (made.search._spread(RELEASED, turn, 32) for turn in (1, 3))
+
+    assert made.search.keep(RELEASED, first).all()
+    both = np.concatenate([first, second]).reshape(64, -1)
+    assert len(np.unique(both, axis=0)) > 60
