@@ -7,10 +7,11 @@ Two valves are on or off, each for a least time.  At every sample
 3. the best of them and plans near the last ones, see :mod:`controllers.plan_search`, are run
    through the nonlinear model, and the best is taken.
 
-So the search is exhaustive over the blocked sequences on the affine modes, and its work is the same
-at every sample.  What the affine modes miss (a stop, the side of Neutral, flows that turn subsonic)
-is judged by the nonlinear model.  A shift from rest begins with plans that are searched with the
-design, see :mod:`controllers.launches`.
+So the search is exhaustive over the blocked sequences on the affine modes, and its work is bounded.
+What the affine modes miss (a stop, the side of Neutral, flows that turn subsonic) is judged by the
+nonlinear model; on the way to Neutral, where that is most, every second sample judges more plans
+instead of ranking any.  A shift from rest begins with plans that are searched with the design, see
+:mod:`controllers.launches`.
 
 A shift is fast and lands softly by its cost, see :mod:`controllers.shift_cost`; a switch has
 a price, and what lies within the tolerance costs nothing, so that at rest nothing switches.
@@ -59,7 +60,8 @@ class HybridMpcSpec:
     switch_s
         Price of a switch: how long the whole way may take longer to save it.
     judged
-        Pairs of plans that the nonlinear model judges at each sample.
+        Pairs of plans that the nonlinear model judges at a sample that ranks others, besides the
+        last plan; twice as many at one that does not.
     """
 
     sample_time_s: float = ranged(1e-3, least=1e-3, most=2e-3)

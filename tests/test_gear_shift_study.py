@@ -43,15 +43,18 @@ def held(found):
 
 
 def test_the_order_of_the_published_follow_ups_is_looked_for_on_every_draw():
-    order = "on drawn plants too: scheduled, then LQ, then PD"
+    last = "PD takes longer than LQ, scheduled or not, on every drawn plant"
+    first = "scheduled LQ takes less time than LQ on most drawn plants"
     swapped = rows(2)
     late = next(k for k, row in enumerate(swapped) if row.design == f"{SCHEDULED} 2")
     swapped[late] = replace(swapped[late], settling_s=0.2)
 
-    assert held(rows())[order][0]
-    assert held(rows())[order][1].endswith("the order holds on 2 of 2")
-    holds, told = held(swapped)[order]
-    assert not holds and told.endswith("the order holds on 1 of 2")
+    assert held(rows())[last][0] and held(rows())[first][0]
+    assert held(rows())[last][1].startswith("on 2 of 2; medians scheduled LQ 120 ms")
+    assert held(rows())[first][1] == "on 2 of 2, which chance alone gives with 25 %"
+    holds, told = held(swapped)[first]
+    assert not holds and told.startswith("on 1 of 2")
+    assert not held(swapped)[last][0]
 
 
 def test_a_shift_that_never_ends_makes_its_design_the_last_one():
