@@ -36,11 +36,12 @@ from controllers.spec import ranged
 from controllers.switching_plans import switching_times
 from linearize.modes import HybridModel
 from linearize.shift_sample import softened
-from linearize.shifting import STATES
+from linearize.shifting import POSITION, STATES, VELOCITY
 from linearize.valve_response import MASK, age, valve_response
 from workbench.contracts import Command, Estimate
 from workbench.errors import InputError, Message
 
+SURE = 3.0  # standard deviations beyond which a speed is no noise
 VALVES = ("valve_1", "valve_2")
 NEAR_M = 1e-3  # a reference this near to a dedicated position means that position
 
@@ -130,8 +131,9 @@ class HybridMpc:
         return Command(np.zeros(2), ShiftMemory())
 
     def step(self, last: Command, reference: np.ndarray, estimate: Estimate) -> Command:
-        x = estimate.pick(STATES)
-        memory = self._towards(self._dedicated(float(reference[0, 0])), last.memory, float(x[2]))
+        target_m = self._dedicated(float(reference[0, 0]))
+        x = self._seen(estimate, target_m)
+        memory = self._towards(target_m, last.memory, float(x[2]))
         shifted = np.concatenate([memory.plans[:, :, 1:], memory.plans[:, :, -1:]], axis=2)
         plans, notes = self._searched(x, memory, shifted)
         now = plans[0, :, 0]
@@ -139,6 +141,16 @@ class HybridMpc:
         return Command(
             now.astype(float), replace(memory, sent=sent, plans=plans, turn=memory.turn + 1), notes
         )
+
+    def _seen(self, estimate: Estimate, target_m: float) -> np.ndarray:
+        """The state; on the target a speed that may be noise is none, so that nothing switches."""
+        x = np.array(estimate.pick(STATES))
+        place, speed = STATES.index(POSITION), STATES.index(VELOCITY)
+        row = estimate.names.index(VELOCITY)
+        noise_m_s = SURE * np.sqrt(estimate.covariance[row, row])
+        if abs(x[place] - target_m) < self.spec.within_m and abs(x[speed]) < noise_m_s:
+            x[speed] = 0.0
+        return x
 
     def _searched(
         self, x: np.ndarray, memory: ShiftMemory, shifted: np.ndarray

@@ -164,6 +164,19 @@ def test_at_rest_on_target_nothing_switches(made):
     assert command.memory.sent == (0, 0)
 
 
+def test_a_speed_that_may_be_noise_switches_nothing_at_rest(made):
+    """Of draw 11 of the study: both valves at the sight of -0.12 m/s at 10 um, and 0.7 mm later."""
+    command, noise = made.start(), np.diag([1e3, 1e3, 1.5e-5, 0.064]) ** 2
+    for _ in range(20):
+        for speed_m_s in (-0.12, 0.1, 0.0):
+            estimate = Estimate(STATES, np.array([1.013e5, 1.013e5, 1e-5, speed_m_s]), noise)
+            command = made.step(command, to(0.0), estimate)
+
+    assert command.memory.sent == (0, 0)
+    sure = Estimate(STATES, np.array([1.013e5, 1.013e5, 1e-5, -0.12]), 1e-2 * noise)
+    assert made._seen(sure, 0.0)[3] == -0.12
+
+
 def test_without_an_answer_the_last_plan_goes_on(made):
     before = made.step(made.start(), to(12e-3), seen(VENTED))
     lost = made.step(before, to(12e-3), seen([np.nan] * 4))
