@@ -74,7 +74,7 @@ class PlanSearch:
             far = self._ranked(x, query, sent, before[0])[:left]
         asked = np.concatenate([near, far])
         costs = self.costs(x, query, sent, asked)
-        order = _distinct(asked, np.argsort(costs, kind="stable"))[:KEPT]
+        order = _distinct(asked, np.argsort(costs, kind="stable"))
         return asked[order], costs[order]
 
     def costs(
@@ -150,8 +150,10 @@ class PlanSearch:
 
 
 def _distinct(asked: np.ndarray, order: np.ndarray) -> np.ndarray:
-    """The order without what stands earlier in it too."""
+    """The first KEPT of the order, without what stands earlier in it too."""
     seen: dict[bytes, int] = {}
     for k in order:
         seen.setdefault(asked[k].tobytes(), k)
+        if len(seen) == KEPT:
+            break
     return np.array([*seen.values()])

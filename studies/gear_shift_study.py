@@ -212,7 +212,7 @@ def _claims_of_order(times: Mapping[str, list[float]]) -> Iterator[Claim]:
     slowest = (pd > lq) & (pd > scheduled)
     told = f"on {int(slowest.sum())} of {len(pd)}; medians {medians}"
     yield Claim(
-        "PD takes longer than LQ, scheduled or not, on every drawn plant", told, slowest.all()
+        "PD takes longer than LQ, scheduled or not, on every drawn plant", told, bool(slowest.all())
     )
     faster = int((scheduled < lq).sum())
     chance = binomtest(faster, len(lq), alternative="greater").pvalue

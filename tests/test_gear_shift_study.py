@@ -38,6 +38,10 @@ def rows(number=2, **other):
     ]
 
 
+def test_claims_can_be_written_as_json():
+    assert [type(claim.holds) for claim in _claims_of_draws(rows())] == [bool] * 6
+
+
 def held(found):
     return {claim.claim: (claim.holds, claim.found) for claim in _claims_of_draws(found)}
 
