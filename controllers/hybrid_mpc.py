@@ -16,7 +16,7 @@ instead of ranking any.  A shift from rest begins with plans that are searched w
 A shift is fast and lands softly by its cost, see :mod:`controllers.shift_cost`; a switch has
 a price, and what lies within the tolerance costs nothing, so that at rest nothing switches.
 
-Without an estimate that is finite the last plan goes on.
+Without an estimate that is finite the last plan goes on; a new target waits for one.
 
 Source: paper 003 Sec. V for the modes.
 """
@@ -67,7 +67,7 @@ class HybridMpcSpec:
 
     sample_time_s: float = ranged(1e-3, least=1e-3, most=2e-3)
     horizon: int = ranged(26, least=16, most=60)
-    hold_s: float = ranged(4e-3, least=3e-3, most=2e-2)
+    hold_s: float = ranged(4e-3, least=3e-3, most=1.9e-2)
     within_m: float = 1e-4
     beyond_m: float = 2e-4
     beyond_weight: float = 240.0
@@ -133,14 +133,29 @@ class HybridMpc:
     def step(self, last: Command, reference: np.ndarray, estimate: Estimate) -> Command:
         target_m = self._dedicated(float(reference[0, 0]))
         x = self._seen(estimate, target_m)
+        if not np.isfinite(x).all():
+            return self._sent(self._blind(last.memory), {"fallback": 1.0})
         memory = self._towards(target_m, last.memory, float(x[2]))
-        shifted = np.concatenate([memory.plans[:, :, 1:], memory.plans[:, :, -1:]], axis=2)
-        plans, notes = self._searched(x, memory, shifted)
-        now = plans[0, :, 0]
+        full = self._full_drive(target_m, memory.sent)
+        asked_for, shifted = query(target_m, memory.start_m), _shifted(memory.plans)
+        plans, costs = self.search.best(x, asked_for, memory.sent, shifted, full, memory.turn)
+        changed = float((plans[0] != shifted[0]).any())
+        cost_s = float(costs[0]) * self.sample_time_s
+        notes = {"cost_s": cost_s, "changed": changed, "fallback": 0.0}
+        return self._sent(replace(memory, plans=plans), notes)
+
+    def _sent(self, memory: ShiftMemory, notes: Mapping[str, float]) -> Command:
+        """The first commands of the best plan."""
+        now = memory.plan[:, 0]
         sent = tuple((s << 1 | int(u)) & MASK for s, u in zip(memory.sent, now, strict=True))
-        return Command(
-            now.astype(float), replace(memory, sent=sent, plans=plans, turn=memory.turn + 1), notes
-        )
+        return Command(now.astype(float), replace(memory, sent=sent, turn=memory.turn + 1), notes)
+
+    def _blind(self, memory: ShiftMemory) -> ShiftMemory:
+        """The old plans go on, to the old target; before any the valves stay as they are."""
+        if memory.plans is not None:
+            return replace(memory, plans=_shifted(memory.plans))
+        held = np.repeat([[s & 1] for s in memory.sent], self.spec.horizon, axis=1)
+        return replace(memory, plans=held[None])
 
     def _seen(self, estimate: Estimate, target_m: float) -> np.ndarray:
         """The state; on the target a speed that may be noise is none, so that nothing switches."""
@@ -151,19 +166,6 @@ class HybridMpc:
         if abs(x[place] - target_m) < self.spec.within_m and abs(x[speed]) < noise_m_s:
             x[speed] = 0.0
         return x
-
-    def _searched(
-        self, x: np.ndarray, memory: ShiftMemory, shifted: np.ndarray
-    ) -> tuple[np.ndarray, Mapping[str, float]]:
-        """Plans, the best first, and what is noted of the search."""
-        if not np.isfinite(x).all():
-            return shifted, {"fallback": 1.0}
-        full = self._full_drive(memory.target_m, memory.sent)
-        asked_for = query(memory.target_m, memory.start_m)
-        plans, costs = self.search.best(x, asked_for, memory.sent, shifted, full, memory.turn)
-        changed = float((plans[0] != shifted[0]).any())
-        cost_s = float(costs[0]) * self.sample_time_s
-        return plans, {"cost_s": cost_s, "changed": changed, "fallback": 0.0}
 
     def _towards(self, target_m: float, memory: ShiftMemory, place_m: float) -> ShiftMemory:
         """The memory with this target; a new one begins with the plans from the nearest position.
@@ -198,16 +200,24 @@ class HybridMpc:
         raise InputError(Message(what, expected=places))
 
 
+def _shifted(plans: np.ndarray) -> np.ndarray:
+    """Plans a sample later, shape (k, 2, N); the last commands go on."""
+    return np.concatenate([plans[:, :, 1:], plans[:, :, -1:]], axis=2)
+
+
 def hybrid_mpc(hybrid: HybridModel, spec: HybridMpcSpec | None = None) -> HybridMpc:
     """The design for the gearbox actuator of a hybrid model.
 
     Raises
     ------
     InputError
-        If more pairs are to be judged than there are.
+        If more pairs are to be judged than there are, or no pulse ends within the horizon.
     """
     spec, plant = spec or HybridMpcSpec(), hybrid.plant
     hold = int(np.ceil(spec.hold_s / spec.sample_time_s - 1e-9))
+    if hold >= spec.horizon:
+        found = f"hybrid-mpc.hold_s is {spec.hold_s:g}, {hold} of {spec.horizon} samples ahead"
+        raise InputError(Message(found, expected="a pulse that ends within the horizon"))
     number = len(switching_times(0, hold))
     if spec.judged >= number**2:
         raise InputError(Message(f"hybrid-mpc.judged is {spec.judged}", expected=f"< {number**2}"))

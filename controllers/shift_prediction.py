@@ -56,8 +56,11 @@ def shift_prediction(
 
 
 def query(target_m: float, start_m: float) -> np.ndarray:
-    """What a shift from one place to another is asked with, shape (3,)."""
-    side = 1.0 if target_m >= start_m else -1.0
+    """What a shift from one place to another is asked with, shape (3,).
+
+    A stop is met from inside, wherever the noise of a sensor sees the start.
+    """
+    side = np.sign(target_m) if target_m else (1.0 if start_m <= 0.0 else -1.0)
     return np.array([target_m, side, float(target_m != 0.0)])
 
 

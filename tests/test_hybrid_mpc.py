@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from controllers.design_file import design, read_design, write_design
 from controllers.hybrid_mpc import HybridMpcSpec
+from controllers.shift_prediction import query
 from controllers.switching_plans import NEVER, flips, plans, switching_times
 from linearize.shift_sample import half_stroke_m, one_sample, softened
 from linearize.shifting import STATES
@@ -185,6 +186,47 @@ def test_without_an_answer_the_last_plan_goes_on(made):
     assert np.array_equal(lost.memory.plan[:, :-1], before.memory.plan[:, 1:])
 
 
+def test_a_new_target_waits_for_an_estimate(made):
+    lost, blind = seen([np.nan] * 4), made.start()
+    for _ in range(3):
+        blind = made.step(blind, to(12e-3), lost)
+    assert blind.memory.sent == (0, 0) and blind.memory.target_m is None
+
+    found = made.step(blind, to(12e-3), seen(VENTED))
+    assert found.memory.target_m == 12e-3
+    assert np.array_equal(
+        found.memory.plan, made.step(made.start(), to(12e-3), seen(VENTED)).memory.plan
+    )
+
+    turned = made.step(found, to(-12e-3), lost)
+    assert turned.memory.target_m == 12e-3
+    assert np.array_equal(turned.memory.plan[:, :-1], found.memory.plan[:, 1:])
+
+
+@pytest.mark.parametrize("end_m", [-12e-3, 12e-3])
+def test_a_shift_that_is_called_back_ends_where_it_began(made, end_m):
+    """The sensor sees the piston 20 um past its stop: that is no way to the other one."""
+    assert query(end_m, end_m + np.sign(end_m) * 2e-5)[1] == np.sign(end_m)
+    step = one_sample(softened(gearbox()), half_stroke_m(gearbox()), 1e-3, stops=True)
+    x, command = np.array([1.013e5, 1.013e5, end_m, 0.0]), made.start()
+    command = made.step(command, to(end_m), seen(x))
+    for k in range(80):
+        noise = np.array([0.0, 0.0, np.sign(end_m) * 2e-5, 0.0])
+        command = made.step(command, to(0.0 if k < 4 else end_m), seen(x + noise))
+        shares = [
+            r.newest(s) for r, s in zip(made.search.responses, command.memory.sent, strict=True)
+        ]
+        x = step(x, shares)[0].full().ravel()
+
+    assert x[2] == pytest.approx(end_m, abs=3e-4)
+
+
+@pytest.mark.parametrize("number", [{"horizon": 16, "hold_s": 1.6e-2}, {"hold_s": 2e-2}])
+def test_a_hold_that_no_pulse_ends_in_is_refused(number):
+    with pytest.raises(InputError, match="hold_s"):
+        design("hybrid-mpc", gearbox(), number)
+
+
 def test_a_place_between_the_dedicated_ones_is_refused(made):
     with pytest.raises(InputError, match="cannot hold the main piston at 5 mm; expected -12 or 0"):
         made.step(made.start(), to(5e-3), seen(VENTED))
@@ -197,7 +239,7 @@ def test_a_plant_without_switching_valves_is_refused():
 
 def test_more_to_judge_than_there_is_is_refused():
     with pytest.raises(InputError, match=r"hybrid-mpc\.judged is"):
-        design("hybrid-mpc", gearbox(), {"judged": 400, "hold_s": 2e-2})
+        design("hybrid-mpc", gearbox(), {"judged": 400, "hold_s": 1.9e-2})
 
 
 def test_a_shift_from_low_to_neutral_lands_softly_where_driving_overshoots(tmp_path):
