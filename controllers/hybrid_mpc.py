@@ -95,7 +95,8 @@ class ShiftMemory:
 
     sent        the last commands of each valve as integers, the newest lowest
     plans       commands from the last sample on, shape (k, 2, N), the best first
-    start_m, target_m    where the shift begins and ends, and ``turn``, its samples so far
+    start_m, target_m    where the shift was seen to begin and where it ends
+    turn        its samples so far
     """
 
     sent: tuple[int, int] = (0, 0)
@@ -114,7 +115,8 @@ class ShiftMemory:
 class HybridMpc:
     """Shifts to the dedicated position that the reference names; see the module.
 
-    ``drives`` are the commands that end there when they are held, by position.
+    ``drives`` are the commands that end there when they are held, by position in m; ``launches``
+    the plans with which a shift begins, by where it begins and ends, in m.
     """
 
     spec: HybridMpcSpec
@@ -154,8 +156,7 @@ class HybridMpc:
         """The old plans go on, to the old target; before any the valves stay as they are."""
         if memory.plans is not None:
             return replace(memory, plans=_shifted(memory.plans))
-        held = np.repeat([[s & 1] for s in memory.sent], self.spec.horizon, axis=1)
-        return replace(memory, plans=held[None])
+        return replace(memory, plans=self.search.held(memory.sent)[None])
 
     def _seen(self, estimate: Estimate, target_m: float) -> np.ndarray:
         """The state; on the target a speed that may be noise is none, so that nothing switches."""
@@ -178,7 +179,7 @@ class HybridMpc:
         nearest_m = min(self.drives, key=lambda start_m: abs(start_m - place_m))
         known = np.concatenate([self.launches.get((nearest_m, target_m), full[:0]), full])
         plans = known[self.search.keep(memory.sent, known)]
-        last = np.broadcast_to([[s & 1] for s in memory.sent], (len(plans), 2, 1))
+        last = np.broadcast_to(self.search.held(memory.sent)[:, :1], (len(plans), 2, 1))
         plans = np.concatenate([last, plans[:, :, :-1]], axis=2)
         return replace(memory, plans=plans, start_m=place_m, target_m=target_m, turn=0)
 

@@ -42,7 +42,7 @@ def launches(search: PlanSearch, rest: np.ndarray, places_m: Iterable[float]) ->
 
 def _launches(search: PlanSearch, start: np.ndarray, asked_for: np.ndarray) -> np.ndarray:
     asked = pulse_pairs(search.responses[0].hold, search.horizon)
-    best = np.argsort(_costs(search, start, asked_for, asked), kind="stable")[:BEGUN]
+    best = np.argsort(search.costs(start, asked_for, RELEASED, asked), kind="stable")[:BEGUN]
     ended = [_descended(search, start, asked_for, plan) for plan in asked[best]]
     ended.sort(key=lambda found: found[0])
     return np.array([plan for _, plan in ended])
@@ -64,20 +64,11 @@ def _descended(
     search: PlanSearch, start: np.ndarray, asked_for: np.ndarray, plan: np.ndarray
 ) -> tuple[float, np.ndarray]:
     """Cost and plan where no switch that is moved, made or taken out is cheaper."""
-    cost = float(_costs(search, start, asked_for, plan[None])[0])
+    cost = float(search.costs(start, asked_for, RELEASED, plan[None])[0])
     while True:
         near = moved(search.responses, RELEASED, plan)
-        costs = _costs(search, start, asked_for, near)
+        costs = search.costs(start, asked_for, RELEASED, near)
         best = int(np.argmin(costs))
         if not costs[best] < cost:
             return cost, plan
         cost, plan = float(costs[best]), near[best]
-
-
-def _costs(
-    search: PlanSearch, start: np.ndarray, asked_for: np.ndarray, asked: np.ndarray
-) -> np.ndarray:
-    """Costs of any number of plans from rest: what a sample judges is filled up."""
-    missing = -len(asked) % (search.judged + 1)
-    filled = np.concatenate([asked, np.repeat(asked[-1:], missing, axis=0)])
-    return search.costs(start, asked_for, RELEASED, filled)[: len(asked)]

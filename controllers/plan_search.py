@@ -36,6 +36,11 @@ GOLDEN = 0.5 * (5.0**0.5 - 1.0)  # its multiples fill an interval evenly, howeve
 class PlanSearch:
     """What is searched, and how much of it.
 
+    A state x is that of :data:`linearize.shifting.STATES` in SI units, shape (4,); ``sent`` are the
+    last commands of each valve as integers, the newest lowest; the query is that of
+    :class:`ShiftPrediction`.
+
+    responses, prediction    what the valves pass, and what the piston does under that
     horizon     N, samples
     judged      plans that the nonlinear model judges at each sample, besides the last one
     price       of a switch, in samples of the whole way
@@ -59,12 +64,10 @@ class PlanSearch:
         """Plans, shape (k, 2, N), and their costs in samples, rising.
 
         ``before`` are those of the last sample, shifted, the best first, shape (k, 2, N), and
-        ``suggested`` one more, shape (2, N); see :class:`ShiftPrediction` for the query.  ``turn``
-        counts the samples of a shift.
+        ``suggested`` one more, shape (2, N).  ``turn`` counts the samples of a shift.
         """
         others = before[1:][self.keep(sent, before[1:])]
-        held = np.repeat([[s & 1] for s in sent], self.horizon, axis=1)
-        known = [before[:1], others, held[None], suggested[None]]
+        known = [before[:1], others, self.held(sent)[None], suggested[None]]
         near = np.concatenate([*known, moved(self.responses, sent, before[0])])
         near = near[: self.judged + 1 - RANKED]
         left = self.judged + 1 - len(near)
@@ -80,18 +83,24 @@ class PlanSearch:
     def costs(
         self, x: np.ndarray, query: np.ndarray, sent: tuple[int, int], asked: np.ndarray
     ) -> np.ndarray:
-        """Costs of plans by the nonlinear model, shape (n,); n is a multiple of judged + 1."""
-        size = self.judged + 1
-        shares = np.stack(self._shares(sent, asked.transpose(1, 0, 2)), axis=-1)
-        parts = [
-            self._calls[2](x, part.ravel(), query)[0]
-            for part in shares.reshape(-1, size * self.horizon * 2)
-        ]
-        standing = np.broadcast_to([[s & 1] for s in sent], (len(asked), 2, 1))
+        """Costs of plans by the nonlinear model, in samples, shape (n,).
+
+        A multiple of judged + 1 of them is what the compiled function takes; others are filled up.
+        """
+        missing = -len(asked) % (self.judged + 1)
+        filled = np.concatenate([asked, np.repeat(asked[-1:], missing, axis=0)])
+        shares = np.stack(self._shares(sent, filled.transpose(1, 0, 2)), axis=-1)
+        parts = shares.reshape(-1, (self.judged + 1) * self.horizon * 2)
+        by_model = np.concatenate([self._calls[2](x, part, query)[0] for part in parts])
+        standing = np.broadcast_to(self.held(sent)[:, :1], (len(asked), 2, 1))
         switches = np.abs(np.diff(asked, axis=2, prepend=standing)).sum(axis=(1, 2))
-        costs = np.concatenate(parts) + self.price * switches
+        costs = by_model[: len(asked)] + self.price * switches
         costs[~np.isfinite(costs)] = np.inf
         return costs
+
+    def held(self, sent: tuple[int, int]) -> np.ndarray:
+        """No switch at all, shape (2, N)."""
+        return np.repeat([[s & 1] for s in sent], self.horizon, axis=1)
 
     def keep(self, sent: tuple[int, int], asked: np.ndarray) -> np.ndarray:
         """True for each plan that switches no valve sooner than it may, shape (n,)."""
@@ -101,8 +110,12 @@ class PlanSearch:
 
     def plans(self, sent: int) -> Plans:
         """The blocked plans of one valve after these commands."""
+        return plans(*self._free(sent))
+
+    def _free(self, sent: int) -> tuple[int, int, int, int]:
+        """Level of a valve, samples until it may switch, least time between switches, and N."""
         hold = self.responses[0].hold
-        return plans(sent & 1, max(hold - age(sent), 0), hold, self.horizon)
+        return sent & 1, max(hold - age(sent), 0), hold, self.horizon
 
     def _ranked(
         self, x: np.ndarray, query: np.ndarray, sent: tuple[int, int], before: np.ndarray
@@ -127,8 +140,7 @@ class PlanSearch:
 
     def _spread(self, sent: tuple[int, int], turn: int, number: int) -> np.ndarray:
         """So many of all pairs of plans, others at each turn, shape (number, 2, N)."""
-        hold = self.responses[0].hold
-        rows = [every_plan(s & 1, max(hold - age(s), 0), hold, self.horizon) for s in sent]
+        rows = [every_plan(*self._free(s)) for s in sent]
         places = (turn * number + np.arange(number)) * GOLDEN % 1.0
         picked = np.divmod((places * len(rows[0]) * len(rows[1])).astype(int), len(rows[1]))
         return np.stack([row[k] for row, k in zip(rows, picked, strict=True)], axis=1)

@@ -55,7 +55,10 @@ class ShiftCost:
 
 
 def stage_cost(cost: ShiftCost, stroke_m: float, dt: float) -> ca.Function:
-    """(far before, position, velocity, query, w of the sample) -> (cost in samples, far)."""
+    """(far before, position, velocity, query, w of the sample) -> (cost in samples, far).
+
+    At a stop the latter is the least so far: an end is met once.
+    """
     names = ("before", "x", "v", "w")
     before, at, speed, weight = (ca.SX.sym(name) for name in names)
     query = ca.SX.sym("q", 3)
@@ -70,6 +73,7 @@ def stage_cost(cost: ShiftCost, stroke_m: float, dt: float) -> ca.Function:
     off_m_s = ca.fmax(ca.fmax(met_m_s - gentle_m_s, faint_m_s - met_m_s), 0.0)
     met = ca.logic_or(reached, returned) * (cost.landing_s / dt) * off_m_s**2
     paid = distance + weight * beyond + met
+    # as if_else(at_stop, fmin(far, before), far), in fewer operations: a sample asks for thousands
     nearest = ca.fmin(far, before + (1.0 - at_stop) * stroke_m * 10.0)
     return ca.Function("stage", [before, at, speed, query, weight], [paid, nearest])
 

@@ -32,12 +32,8 @@ def rest(place_m):
 
 
 def costs(made, start_m, target_m, plans):
-    """Of any number of plans from rest, one call each."""
-    size = made.spec.judged + 1
-    asked = query(target_m, start_m)
-    return np.array(
-        [made.search.costs(rest(start_m), asked, RELEASED, np.stack([p] * size))[0] for p in plans]
-    )
+    """Of plans from rest."""
+    return made.search.costs(rest(start_m), query(target_m, start_m), RELEASED, np.array(plans))
 
 
 def keeps_hold(plan):
@@ -66,6 +62,13 @@ def test_no_plan_near_the_launch_and_no_pair_of_pulses_costs_less(made, start_m,
     assert costs(made, start_m, target_m, near).min() >= found[0]
     assert costs(made, start_m, target_m, pairs).min() >= found[0]
     assert costs(made, start_m, target_m, [made._full_drive(target_m, RELEASED)])[0] > found[0]
+
+
+def test_what_plans_cost_does_not_depend_on_how_many_are_asked(made):
+    plans = pulse_pairs(HOLD, N)[:70]
+    alone = [costs(made, -END_M, 0.0, [plan])[0] for plan in plans]
+
+    assert costs(made, -END_M, 0.0, plans).tolist() == alone
 
 
 @pytest.mark.parametrize("turn", [0, 1])
