@@ -31,9 +31,7 @@ from workbench.fitting.windows import cut_windows
 from workbench.recording import Recording
 
 SHARES = (0.1, 0.3)  # of the length of a window, one after the other
-# Mean square of an output's error over that of its noise, which is known to a few percent.  A fit
-# a third above it told a gearbox's valves so late that a shift missed its time.
-AT_NOISE = 1.1
+AT_NOISE = 1.5  # mean square of an output's error over that of its noise
 
 
 def better_from_short_windows(problem: Problem, train: Sequence[Recording]) -> Problem:
