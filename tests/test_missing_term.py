@@ -199,3 +199,18 @@ def test_the_legend_of_the_missing_term_stands_above_it():
 
     highest = axes.transData.transform((0.0, max(axes.lines[0].get_ydata())))[1]
     assert axes.get_legend().get_window_extent().y0 > highest
+
+
+@pytest.mark.parametrize("size", [0.0, 1e-16, 1e-12])
+def test_a_signal_at_its_limit_is_one_bin_however_it_is_rounded(size):
+    """Half of the time a bristle is bent to one end or the other, but for the last digits."""
+    random = np.random.default_rng(4)
+    bent = np.clip(swept(), -0.7, 0.7)
+    values = bent + size * random.standard_normal(len(bent))
+    term = np.sin(3.0 * bent) + 0.3 * random.standard_normal(len(bent))
+
+    (exact,), (found,) = (dependences({PLACE: row}, {}, term, term) for row in (bent, values))
+
+    assert found.explains == pytest.approx(exact.explains, rel=1e-9)
+    assert found.bins.shape == exact.bins.shape
+    assert exact.bins[0, [0, -1]] == pytest.approx([-0.7, 0.7], abs=1e-3)

@@ -28,6 +28,7 @@ from workbench.plant import Plant
 
 BINS = 15
 FEWEST = 5  # samples of each direction in a bin that counts
+SAME = 1e-6  # of the range of a signal: values that differ by less are one
 REVERSAL = 0.1  # standard deviations that a signal comes back from its turning point
 
 
@@ -92,12 +93,12 @@ def _dependence(
     neighbour: np.ndarray,
 ) -> Dependence:
     """eta^2 over quantile bins of a variable, and its loops."""
-    edges = np.unique(np.quantile(values, np.linspace(0, 1, BINS + 1)))
+    begins = _begins(values)
     variance = float(term.var())
-    if len(edges) < 3 or variance <= 0.0:
+    if len(begins) < 2 or variance <= 0.0:
         return Dependence(name, 0.0, np.zeros((3, 0)))
-    where = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, len(edges) - 2)
-    members = [where == k for k in range(len(edges) - 1)]
+    where = np.searchsorted(begins, values, side="right") - 1
+    members = [where == k for k in range(len(begins))]
     members = [inside for inside in members if inside.any()]
     rows = (values, term, neighbour)
     centres, means, others = (_means(row, members) for row in rows)
@@ -107,6 +108,17 @@ def _dependence(
     explains = between / variance
     loops = (_loop(by, way, members, values, term) for by, way in directions.items())
     return Dependence(name, explains, bins, others, tuple(each for each in loops if each))
+
+
+def _begins(values: np.ndarray) -> np.ndarray:
+    """Where each bin begins.
+
+    A signal at its limit, as a bristle that is bent, differs from sample to sample by rounding:
+    that makes one bin, which begins below all of it.
+    """
+    found = np.quantile(values, np.arange(BINS) / BINS)
+    alike = SAME * float(np.ptp(values))
+    return found[np.diff(found, prepend=-np.inf) > alike] - alike
 
 
 def _means(values: np.ndarray, members: list[np.ndarray]) -> np.ndarray:
