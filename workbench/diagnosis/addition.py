@@ -13,7 +13,7 @@ from workbench.diagnosis.evidence import WARNINGS, Recordings, held_out, weighed
 from workbench.diagnosis.law import empirical_law, plant_with_terms
 from workbench.diagnosis.pairs import pair_fit
 from workbench.diagnosis.refit import refit, refit_shaken
-from workbench.diagnosis.result import Diagnosis, Evidence, Law, told
+from workbench.diagnosis.result import Diagnosis, Evidence, Law, Ranked, told
 from workbench.diagnosis.rough import rough_fit
 from workbench.diagnosis.scan import scan, scan_catalogue
 from workbench.diagnosis.settle import settled
@@ -162,14 +162,18 @@ def accept(rig: Rig, diagnosis: Diagnosis) -> Addition:
     best = diagnosis.ranking[0] if diagnosis.ranking else None
     if best is None or best.fit is None:
         raise ValueError(f"{diagnosis.rig_name}: the diagnosis followed no candidate to a refit")
-    drops = (best.drop_train, best.drop_validation)
+    return addition_of(rig, diagnosis, best)
+
+
+def addition_of(rig: Rig, diagnosis: Diagnosis, row: Ranked) -> Addition:
+    """A refitted row of a ranking added to the diagnosed rig as it was fitted there."""
     return addition(
         rig,
         diagnosis.before,
-        best.candidate,
-        best.fit,
-        best.validation,
-        drops,
+        row.candidate,
+        row.fit,
+        row.validation,
+        (row.drop_train, row.drop_validation),
         diagnosis.evidence,
     )
 

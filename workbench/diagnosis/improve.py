@@ -11,7 +11,7 @@ Source: diagnosis.md 1.9 and 1.10 (forward selection with a new scan after each 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import inf
 
 from workbench.comparison.free_run import free_run_errors
@@ -22,13 +22,12 @@ from workbench.diagnosis.addition import (
     accept_law,
     add,
     add_law,
-    apart,
     assembled,
 )
 from workbench.diagnosis.diagnose import Progress, diagnose, silent
-from workbench.diagnosis.improvement import Change, Improvement, Stage
-from workbench.diagnosis.passes import Kept, Passes, Removal, Swap
-from workbench.diagnosis.result import Diagnosis, Law
+from workbench.diagnosis.improvement import Change, Improvement
+from workbench.diagnosis.passes import Kept, Passes
+from workbench.diagnosis.rounds import Rounds, forward
 from workbench.fitting.errors import Errors, errors_of, per_sample
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.posterior import Moved, fitted_rig, moved_parameters
@@ -38,28 +37,7 @@ from workbench.rig import Rig
 
 __all__ = ["Addition", "Improvement", "accept", "add", "add_law", "improve"]
 
-MOST_ROUNDS = 8
 LESS = 0.98  # of the error that is left: a fit that leaves no less is no step of its own
-
-
-@dataclass(frozen=True)
-class _Rounds:
-    """How far the work has come."""
-
-    rig: Rig
-    kept: Kept | None = None
-    steps: tuple[Addition, ...] = ()
-    diagnoses: tuple[Diagnosis, ...] = ()
-    removals: tuple[Removal, ...] = ()
-    swaps: tuple[Swap, ...] = ()
-    budget: tuple[Stage, ...] = ()
-    law: Law | None = None
-    stopped: bool = False
-
-    def marked(self, label: str, fit: Fit, held_out: Fit | None, change: Change) -> _Rounds:
-        """The same with one more bar in the budget."""
-        stage = Stage(label, per_sample(fit), per_sample(held_out), change)
-        return replace(self, budget=(*self.budget, stage))
 
 
 def improve(
@@ -72,10 +50,11 @@ def improve(
     """Diagnose and add until nothing in the catalogue earns its place, then think again.
 
     The effect added is the first of the ranking where it passes every criterion, also where an
-    empirical law would do better: a physical effect comes first.  Where recording and rig
-    contradict each other nothing more is added, and what was added before stays.  With ``law`` an
-    empirical law is taken in the end, where one passes the same criteria.  An interrupt after the
-    first finished round ends the work there, with what is finished.
+    empirical law would do better: a physical effect comes first.  What the held-out recording alone
+    refuses may come in with the next one (:mod:`workbench.diagnosis.rounds`).  Where recording and
+    rig contradict each other nothing more is added, and what was added before stays.  With ``law``
+    an empirical law is taken in the end, where one passes the same criteria.  An interrupt after
+    the first finished round ends the work there, with what is finished.
 
     Raises
     ------
@@ -88,7 +67,7 @@ def improve(
     if proves_nothing(train, validation):
         raise ValueError(f"{NO_EVIDENCE}; expected another manoeuvre")
     train, validation = checked(rig, train, validation)
-    done = _forward(_Rounds(rig), train, validation, progress)
+    done = forward(Rounds(rig), train, validation, progress)
     for proceed in (_thought_over, _with_law) if law else (_thought_over,):
         if not done.stopped:
             done = proceed(done, train, validation, progress)
@@ -96,49 +75,12 @@ def improve(
     return _improvement(done, train, validation)
 
 
-def _forward(
-    done: _Rounds,
-    train: Sequence[Recording],
-    validation: Sequence[Recording],
-    progress: Progress,
-) -> _Rounds:
-    """Rounds of diagnosis and addition, until the ranking puts nothing first that is accepted."""
-    for count in range(1, MOST_ROUNDS + 1):
-        current = assembled(done.rig, done.steps)
-        try:
-            progress(f"round {count}")
-            diagnosis = diagnose(current, train, validation, progress)
-        except KeyboardInterrupt:
-            if not done.steps:
-                raise
-            progress(f"stopped in round {count}: {len(done.steps)} finished")
-            return replace(done, stopped=True)
-        if not done.budget:
-            base = (diagnosis.base, diagnosis.base_validation)
-            done = done.marked(Change.START.value, *base, Change.START)
-        done = replace(done, diagnoses=(*done.diagnoses, diagnosis))
-        if diagnosis.contradicted:
-            progress(f"stopped in round {count}: {diagnosis.sentence}")
-            break
-        best = diagnosis.ranking[0] if diagnosis.ranking else None
-        if best is None or best.fit is None or not best.accepted:
-            break
-        progress(f"accepted {best.candidate.name}")
-        step = accept(current, diagnosis)
-        steps = (*done.steps, *apart(step))
-        kept = Kept(steps, step.fit, step.validation_fit)
-        done = replace(done, steps=steps, kept=kept)
-        label = f"+ {step.candidate.name}"
-        done = done.marked(label, step.fit, step.validation_fit, Change.ADDED)
-    return done
-
-
 def _thought_over(
-    done: _Rounds,
+    done: Rounds,
     train: Sequence[Recording],
     validation: Sequence[Recording],
     progress: Progress,
-) -> _Rounds:
+) -> Rounds:
     """Backward pass, then swap pass; an interrupt keeps what is finished."""
     rounds = [each for each in done.diagnoses if not each.contradicted and each.ranking]
     rounds = [each for each in rounds if each.ranking[0].accepted]
@@ -155,7 +97,7 @@ def _thought_over(
     return done
 
 
-def _removed(done: _Rounds, passes: Passes, step: Addition) -> _Rounds:
+def _removed(done: Rounds, passes: Passes, step: Addition) -> Rounds:
     """Backward pass over one effect; one alone was judged in its round."""
     if done.kept is None or len(done.kept.steps) < 2:
         return done
@@ -167,7 +109,7 @@ def _removed(done: _Rounds, passes: Passes, step: Addition) -> _Rounds:
     return done.marked(label, kept.fit, kept.validation, Change.DROPPED)
 
 
-def _swapped(done: _Rounds, passes: Passes, step: Addition) -> _Rounds:
+def _swapped(done: Rounds, passes: Passes, step: Addition) -> Rounds:
     """Swap pass over one effect."""
     if done.kept is None:
         return done
@@ -180,11 +122,11 @@ def _swapped(done: _Rounds, passes: Passes, step: Addition) -> _Rounds:
 
 
 def _with_law(
-    done: _Rounds,
+    done: Rounds,
     train: Sequence[Recording],
     validation: Sequence[Recording],
     progress: Progress,
-) -> _Rounds:
+) -> Rounds:
     """An empirical law on top, where nothing of the catalogue earns its place and one passes."""
     steps = done.kept.steps if done.kept else ()
     current, last = assembled(done.rig, steps), done.diagnoses[-1]
@@ -207,7 +149,7 @@ def _with_law(
 
 
 def _improvement(
-    done: _Rounds, train: Sequence[Recording], validation: Sequence[Recording]
+    done: Rounds, train: Sequence[Recording], validation: Sequence[Recording]
 ) -> Improvement:
     """The result, with errors before and after and all that the final fit moved."""
     first = done.diagnoses[0]
@@ -248,7 +190,7 @@ def _improvement(
     )
 
 
-def _last_fit(done: _Rounds, kept: Kept) -> tuple[Fit, Fit | None]:
+def _last_fit(done: Rounds, kept: Kept) -> tuple[Fit, Fit | None]:
     """The fit of what is kept: that of the last diagnosis where it leaves less on both sets.
 
     A refit weighs errors as the model without its effect made them, and where that effect was large
