@@ -20,25 +20,30 @@ BARE = 'name = "bench"\nplant = "cylinder_bench"\n[values]\n"chamber.area" = "51
 PAIR = ("coulomb_friction", "constant_force")
 
 
-def mostly_inwards(seed, gauge_pa):
-    """10 s of which the rod moves outwards for a tenth: there friction and force add up.
-
-    Inwards 8 N of friction and a force of 8 N on the rod cancel at the sensor, so either alone
-    makes nine tenths of the recording worse.
-    """
+def strokes(seed, back, friction_n, force_n, gauge_pa=3e5):
+    """10 s at 100 Hz of which the rod moves back, with negative speed, for a share of the time."""
     rng = np.random.default_rng(seed)
     time_s = 0.01 * np.arange(1000)
     speed_m_s = 0.02 + 0.012 * np.sin(2 * np.pi * (0.41 + 0.02 * seed) * time_s)
-    v = speed_m_s * np.where(np.mod(time_s + 0.13 * seed, 2.0) < 0.2, -1.0, 1.0)
+    v = speed_m_s * np.where(np.mod(time_s + 0.13 * seed, 2.0) < 2.0 * back, -1.0, 1.0)
     p = gauge_pa * (1 + 0.1 * np.sin(2 * np.pi * 0.31 * time_s))
-    force = p * AREA_M2 + 8.0 * np.sign(v) - 8.0 + 0.2 * rng.standard_normal(len(v))
+    force = p * AREA_M2 + friction_n * np.sign(v) + force_n + 0.2 * rng.standard_normal(len(v))
     channels = {
         "chamber.pressure_pa": p + AMBIENT_PA,
         "rod.position_m": 0.01 * np.cumsum(v),
         "rod.velocity_m_s": v,
         "rod.force_n": force,
     }
-    return Recording(f"inwards {seed}", 0.01, channels, noise={"rod.force_n": 0.2})
+    return Recording(f"strokes {seed}", 0.01, channels, noise={"rod.force_n": 0.2})
+
+
+def mostly_inwards(seed, gauge_pa):
+    """The rod moves outwards for a tenth of the time: there friction and force add up.
+
+    Inwards 8 N of friction and a force of 8 N on the rod cancel at the sensor, so either alone
+    makes nine tenths of the recording worse.
+    """
+    return strokes(seed, 0.1, 8.0, -8.0, gauge_pa)
 
 
 @pytest.fixture(scope="module")

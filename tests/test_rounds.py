@@ -5,15 +5,13 @@ inwards for most of what is held out.  Friction and a constant force add up outw
 alone is fitted with the size of both, and held out that is worse than nothing.
 """
 
-import numpy as np
 import pytest
-from test_diagnosis import AMBIENT_PA, AREA_M2
+from test_pairs import strokes
 
 from workbench.diagnosis import diagnose as diagnosis
 from workbench.diagnosis.improve import improve
 from workbench.diagnosis.judge import HELD_OUT_REASON
 from workbench.diagnosis.passes import Passes, Removal
-from workbench.recording import Recording
 from workbench.rig import load_rig
 
 BARE = 'name = "bench"\nplant = "cylinder_bench"\n[values]\n"chamber.area" = "518.7 mm^2"\n'
@@ -21,20 +19,8 @@ FRICTION_N, FORCE_N = 8.0, 6.0
 
 
 def recorded(seed, outwards, friction_n=FRICTION_N, force_n=FORCE_N):
-    """20 s of which the rod moves outwards for a share of the time."""
-    rng = np.random.default_rng(seed)
-    time_s = 0.01 * np.arange(2000)
-    speed_m_s = 0.02 + 0.012 * np.sin(2 * np.pi * (0.41 + 0.02 * seed) * time_s)
-    v = speed_m_s * np.where(np.mod(time_s + 0.13 * seed, 2.0) < 2.0 * outwards, 1.0, -1.0)
-    p = 3e5 * (1 + 0.1 * np.sin(2 * np.pi * 0.31 * time_s))
-    force = p * AREA_M2 + friction_n * np.sign(v) + force_n + 0.2 * rng.standard_normal(len(v))
-    channels = {
-        "chamber.pressure_pa": p + AMBIENT_PA,
-        "rod.position_m": 0.01 * np.cumsum(v),
-        "rod.velocity_m_s": v,
-        "rod.force_n": force,
-    }
-    return Recording(f"outwards {seed}", 0.01, channels, noise={"rod.force_n": 0.2})
+    """The rod moves outwards for a share of the time."""
+    return strokes(seed, 1.0 - outwards, friction_n, force_n)
 
 
 @pytest.fixture

@@ -117,7 +117,7 @@ def _round(done: Rounds, asked: _Asked) -> Rounds:
         asked.progress(f"accepted {diagnosis.ranking[0].candidate.name}")
         return done.added(accept(current, diagnosis))
     hopeful = _promising(diagnosis)
-    return _further(done, diagnosis, hopeful, asked) if hopeful else done
+    return _further(done, addition_of(current, diagnosis, hopeful), asked) if hopeful else done
 
 
 def _accepts(diagnosis: Diagnosis) -> bool:
@@ -141,22 +141,20 @@ def _promising(diagnosis: Diagnosis) -> Ranked | None:
     return max(refused, key=lambda row: row.drop_train, default=None)
 
 
-def _further(done: Rounds, diagnosis: Diagnosis, hopeful: Ranked, asked: _Asked) -> Rounds:
+def _further(done: Rounds, step: Addition, asked: _Asked) -> Rounds:
     """What a refused effect and the next one after it do together; as it was where they fail."""
-    name = hopeful.candidate.name
-    asked.progress(f"one round further with {name}")
-    tried = done.added(addition_of(assembled(done.rig, done.steps), diagnosis, hopeful))
+    asked.progress(f"one round further with {step.candidate.name}")
+    tried, without = done.added(step), done.diagnoses[-1].base_validation
     current = assembled(tried.rig, tried.steps)
     second = asked.diagnosis(current)
     if second.contradicted or not _accepts(second):
         return done
-    step = tried.steps[-1]
     both = tried.told(second).added(accept(current, second))
-    if not plain_ratio(diagnosis.base_validation, both.kept.validation) < 1.0 - LEAST_HELD_OUT:
+    if not plain_ratio(without, both.kept.validation) < 1.0 - LEAST_HELD_OUT:
         return done  # better than with a bad one alone, but no better than without
     passes = Passes(done.rig, asked.train, asked.validation, {}, asked.progress)
     removal, _ = passes.removal(both.kept, step)
     if removal.dropped:
         return done
-    asked.progress(f"accepted {name} and {second.ranking[0].candidate.name}")
+    asked.progress(f"accepted {step.candidate.name} and {second.ranking[0].candidate.name}")
     return both
