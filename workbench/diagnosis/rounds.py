@@ -91,8 +91,8 @@ def forward(
     """
     asked = _Asked(train, validation, progress)
     for count in range(1, MOST_ROUNDS + 1):
-        progress(f"round {count}")
         try:
+            progress(f"round {count}")
             later = _round(done, asked)
         except KeyboardInterrupt:
             if not done.steps:
