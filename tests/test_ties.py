@@ -7,7 +7,14 @@ import pytest
 from test_judgement import BARE, HELD_OUT, TRAIN, named, unsure
 
 from workbench.diagnosis.diagnose import _followed, silent
-from workbench.diagnosis.judge import SHARE_REASON, alignment, imitation, tie_group
+from workbench.diagnosis.judge import (
+    HELD_OUT_REASON,
+    SHARE_REASON,
+    alignment,
+    imitation,
+    reasons_against,
+    tie_group,
+)
 from workbench.diagnosis.ranking import ranked
 from workbench.diagnosis.result import Verdict
 from workbench.diagnosis.verdict import judged, sentence
@@ -70,6 +77,19 @@ def test_what_leaves_several_times_as_much_on_the_held_out_recording_is_told_apa
         other = replace(rival, drop_train=0.84, drop_validation=held_out)
         names = [each.candidate for each in tie_group(problem.base, [leader, other], same)]
         assert (rival.candidate in names) is tied
+
+
+def test_a_rival_that_a_few_held_out_windows_refuse_stays_in_the_tie(problem, followed, sound):
+    """Where it leaves clearly less in training and held out no more than the leader."""
+    leader = replace(sound, drop_train=0.42, drop_validation=0.46)
+    rival = replace(named(sound, followed, 0), drop_train=0.71, plain_validation=2.3)
+
+    for better, held_out, tied in ((0.71, 0.41, True), (0.71, 0.20, False), (0.50, 0.41, False)):
+        other = replace(rival, drop_train=better, drop_validation=held_out)
+        assert HELD_OUT_REASON in reasons_against(problem.base, other)
+        group = [each.candidate for each in tie_group(problem.base, [leader, other], {})]
+        assert (rival.candidate in group) is tied
+        assert group[0] == leader.candidate
 
 
 @pytest.mark.parametrize(

@@ -143,18 +143,20 @@ def tie_group(base: Fit, refits: list[Refit], profiles: dict[str, Profile]) -> l
 
     A candidate is tied when its drop comes within a quarter of the best, or within half of it with
     a signature in the same direction: then only the nuisances decide between the two, and on the
-    held-out recording too, unless one leaves several times as much there.  Among the tied those
-    that pass every criterion come first, effects before parameters that would lie far off what is
-    known of them, and among these the held-out recording decides where it does so clearly: the one
-    that leaves at least a fifth less of the misfit there leads.  Those that look most like the
-    leader stand next to it: were it wrong, it would stand for one of them.
+    held-out recording too, unless one leaves several times as much there, or fails to predict it by
+    more than a few of its windows.  Among the tied those that pass every criterion come first,
+    effects before parameters that would lie far off what is known of them, and among these the
+    held-out recording decides where it does so clearly: the one that leaves at least a fifth less
+    of the misfit there leads.  Those that look most like the leader stand next to it: were it
+    wrong, it would stand for one of them.
     """
     best = refits[0]
     tied = [best]
     for other in refits[1:]:
         gap = (best.drop_train - other.drop_train) / max(best.drop_train, 1e-12)
         same = abs(_alignment_of(best, other, profiles)) > SAME_DIRECTION
-        if predicts(best) and not predicts(other) and not same:
+        told_apart = predicts(best) and not predicts(other)
+        if told_apart and not (same or _refused_by_few(other, best)):
             continue
         if left_held_out(other) > FAR_WORSE * max(left_held_out(best), LITTLE_LEFT):
             continue
@@ -170,6 +172,19 @@ def tie_group(base: Fit, refits: list[Refit], profiles: dict[str, Profile]) -> l
     others = [each for each in tied if each is not leader]
     others.sort(key=lambda r: (r not in sound, -abs(_alignment_of(leader, r, profiles))))
     return [leader, *others]
+
+
+def _refused_by_few(other: Refit, best: Refit) -> bool:
+    """True where single held-out windows alone refuse what explains clearly more in training.
+
+    Where no window counts too much it predicts better than without, and not clearly worse than the
+    leader: so it may well be what the leader stands for.
+    """
+    less = 1.0 - CLEARLY_LESS
+    if not other.drop_validation > LEAST_HELD_OUT:
+        return False
+    more = 1.0 - other.drop_train < less * (1.0 - best.drop_train)
+    return more and not left_held_out(best) < less * left_held_out(other)
 
 
 def left_held_out(each: Refit | Ranked) -> float:
