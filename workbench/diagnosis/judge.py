@@ -167,7 +167,7 @@ def tie_group(base: Fit, refits: list[Refit], profiles: dict[str, Profile]) -> l
     tied = tied[: max(len(sound), LARGEST_TIE)]
     effects = [each for each in sound if each.candidate.name in profiles] or sound
     best, leader = effects[0], min(effects, key=left_held_out)
-    if not left_held_out(leader) < (1.0 - CLEARLY_LESS) * left_held_out(best):
+    if not clearly_less(left_held_out(leader), left_held_out(best)):
         leader = best
     others = [each for each in tied if each is not leader]
     others.sort(key=lambda r: (r not in sound, -abs(_alignment_of(leader, r, profiles))))
@@ -180,11 +180,15 @@ def _refused_by_few(other: Refit, best: Refit) -> bool:
     Where no window counts too much it predicts better than without, and not clearly worse than the
     leader: so it may well be what the leader stands for.
     """
-    less = 1.0 - CLEARLY_LESS
     if not other.drop_validation > LEAST_HELD_OUT:
         return False
-    more = 1.0 - other.drop_train < less * (1.0 - best.drop_train)
-    return more and not left_held_out(best) < less * left_held_out(other)
+    more = clearly_less(1.0 - other.drop_train, 1.0 - best.drop_train)
+    return more and not clearly_less(left_held_out(best), left_held_out(other))
+
+
+def clearly_less(left: float, than: float) -> bool:
+    """True where one share of a misfit is smaller than another by a fifth at least."""
+    return left < (1.0 - CLEARLY_LESS) * than
 
 
 def left_held_out(each: Refit | Ranked) -> float:

@@ -15,7 +15,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from workbench.candidate import Candidate
-from workbench.diagnosis.judge import CLEARLY_LESS, reasons_against, share_removed
+from workbench.diagnosis.judge import clearly_less, reasons_against, share_removed
 from workbench.diagnosis.law_choice import worth_scanning
 from workbench.diagnosis.law_seed import refitted, seeds
 from workbench.diagnosis.refit import Refit, held_out_drop, refit
@@ -54,7 +54,7 @@ def empirical_law(
     if law is None or other is None:
         return law or other
     left, left_by_law = (1.0 - share_removed(each) for each in (other, law))
-    return other if left < (1.0 - CLEARLY_LESS) * left_by_law else law
+    return other if clearly_less(left, left_by_law) else law
 
 
 def _at_once(problem: Problem, terms: Sequence[Candidate], where: Where | None) -> Law | None:

@@ -17,10 +17,10 @@ from math import inf, isnan
 
 from workbench.candidate import Candidate
 from workbench.diagnosis.judge import (
-    CLEARLY_LESS,
     CLOSE_DROP,
     LEAST_SHARE,
     LEAST_TRAINING,
+    clearly_less,
     left_held_out,
     predicts,
     reasons_against,
@@ -111,7 +111,7 @@ def _reasons(problem: Problem, found: Refit, ranking: Sequence[Ranked]) -> tuple
     if against:
         return against
     singles = [row for row in ranking if row.fit is not None and predicts_row(row)]
-    if any(not _clearly_less(found, row) for row in singles):
+    if any(not _leaves_less(found, row) for row in singles):
         return (NOT_ALONE,)
     first, second = found.candidate.singles
     halves = ((first, second), (second, first))
@@ -122,12 +122,12 @@ def _reasons(problem: Problem, found: Refit, ranking: Sequence[Ranked]) -> tuple
     )
 
 
-def _clearly_less(found: Refit, single: Ranked) -> bool:
+def _leaves_less(found: Refit, single: Ranked) -> bool:
     """True where a pair leaves a fifth less than a single one, in training and held out."""
-    share = 1.0 - CLEARLY_LESS
-    if not 1.0 - found.drop_train < share * (1.0 - single.drop_train):
+    if not clearly_less(1.0 - found.drop_train, 1.0 - single.drop_train):
         return False
-    return isnan(found.drop_validation) or left_held_out(found) < share * left_held_out(single)
+    held_out = left_held_out(found), left_held_out(single)
+    return isnan(found.drop_validation) or clearly_less(*held_out)
 
 
 def _beside(problem: Problem, found: Refit, one: Candidate, other: Candidate) -> tuple[str, ...]:

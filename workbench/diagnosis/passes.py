@@ -19,7 +19,7 @@ from workbench.candidate import Candidate
 from workbench.diagnosis.addition import Addition, addition, assembled
 from workbench.diagnosis.diagnose import Progress
 from workbench.diagnosis.evidence import weighed
-from workbench.diagnosis.judge import CLEARLY_LESS, reasons_against
+from workbench.diagnosis.judge import clearly_less, reasons_against
 from workbench.diagnosis.refit import Refit, refit, refit_from, refit_shaken, refit_shift
 from workbench.diagnosis.result import Diagnosis, Evidence, Ranked
 from workbench.diagnosis.rough import rough_fit
@@ -206,7 +206,7 @@ def clearly_better(base: Fit, one: Refit, other: Refit) -> bool:
     """True where one passes every criterion and leaves a fifth less misfit, held out too."""
 
     def less(a: float, b: float) -> bool:
-        return max(1.0 - a, LEAST_LEFT) < (1.0 - CLEARLY_LESS) * max(1.0 - b, LEAST_LEFT)
+        return clearly_less(max(1.0 - a, LEAST_LEFT), max(1.0 - b, LEAST_LEFT))
 
     ahead = less(one.drop_train, other.drop_train)
     ahead = ahead and less(one.drop_validation, other.drop_validation)
