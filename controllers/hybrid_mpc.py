@@ -10,8 +10,7 @@ Two valves are on or off, each for a least time.  At every sample
 So the search is exhaustive over the blocked sequences on the affine modes, and its work is bounded.
 What the affine modes miss (a stop, the side of Neutral, flows that turn subsonic) is judged by the
 nonlinear model; on the way to Neutral, where that is most, every second sample judges more plans
-instead of ranking any, and so does one at which the last plan costs clearly more than it was to.
-A shift from rest begins with plans that are searched with the design, see
+instead of ranking any.  A shift from rest begins with plans that are searched with the design, see
 :mod:`controllers.launches`.
 
 A shift is fast and lands softly by its cost, see :mod:`controllers.shift_cost`; a switch has
@@ -30,7 +29,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from controllers.launches import Launches, launches
-from controllers.plan_search import Handed, PlanSearch
+from controllers.plan_search import PlanSearch
 from controllers.shift_cost import ShiftCost
 from controllers.shift_prediction import drives, query, shift_prediction
 from controllers.spec import ranged
@@ -96,14 +95,12 @@ class ShiftMemory:
 
     sent        the last commands of each valve as integers, the newest lowest
     plans       commands from the last sample on, shape (k, 2, N), the best first
-    cost        of the best of them when it was chosen, in samples
     start_m, target_m    where the shift was seen to begin and where it ends
     turn        its samples so far
     """
 
     sent: tuple[int, int] = (0, 0)
     plans: np.ndarray | None = None
-    cost: float = np.nan
     start_m: float = 0.0
     target_m: float | None = None
     turn: int = 0
@@ -143,12 +140,11 @@ class HybridMpc:
         memory = self._towards(target_m, last.memory, float(x[2]))
         full = self._full_drive(target_m, memory.sent)
         asked_for, shifted = query(target_m, memory.start_m), _shifted(memory.plans)
-        handed = Handed(shifted, memory.cost, memory.turn)
-        plans, costs = self.search.best(x, asked_for, memory.sent, handed, full)
+        plans, costs = self.search.best(x, asked_for, memory.sent, shifted, full, memory.turn)
         changed = float((plans[0] != shifted[0]).any())
-        cost = float(costs[0])
-        notes = {"cost_s": cost * self.sample_time_s, "changed": changed, "fallback": 0.0}
-        return self._sent(replace(memory, plans=plans, cost=cost), notes)
+        cost_s = float(costs[0]) * self.sample_time_s
+        notes = {"cost_s": cost_s, "changed": changed, "fallback": 0.0}
+        return self._sent(replace(memory, plans=plans), notes)
 
     def _sent(self, memory: ShiftMemory, notes: Mapping[str, float]) -> Command:
         """The first commands of the best plan."""
@@ -185,8 +181,7 @@ class HybridMpc:
         plans = known[self.search.keep(memory.sent, known)]
         last = np.broadcast_to(self.search.held(memory.sent)[:, :1], (len(plans), 2, 1))
         plans = np.concatenate([last, plans[:, :, :-1]], axis=2)
-        places = {"start_m": place_m, "target_m": target_m}
-        return replace(memory, plans=plans, cost=np.nan, turn=0, **places)
+        return replace(memory, plans=plans, start_m=place_m, target_m=target_m, turn=0)
 
     def _full_drive(self, target_m: float, sent: tuple[int, int]) -> np.ndarray:
         """Both valves as soon as they may as they end at the target, shape (2, N)."""

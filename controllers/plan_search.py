@@ -7,10 +7,9 @@ Plans, none of which switches sooner than a valve may, are commands ahead, shape
 - no switch at all, and what the caller suggests;
 - the best plan of a sample ago with one switch moved by a sample or two;
 - of all pairs of blocked plans the best under the affine modes along it, ranked exactly;
-- on the way to Neutral, at every second sample and wherever the last plan costs clearly more than
-  it was to, instead of these plans from all over those of two switches per valve: far from a poor
-  plan its modes tell nothing of a good one, and a brake that comes too early leaves the piston
-  half-way.
+- on the way to Neutral, at every second sample instead of these, plans from all over those of two
+  switches per valve: far from a poor plan its modes tell nothing of a good one, and a brake that
+  comes too early leaves the piston half-way.
 
 The nonlinear model judges each, so a plan is only changed for one that this prefers.
 """
@@ -30,22 +29,7 @@ from workbench.called import prepared
 
 KEPT = 8  # plans that a sample hands on to the next
 RANKED = 4  # plans at least that come from the affine modes
-LOST = 2.0  # samples: a plan that costs so much more than it was to is replaced from all over
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)  # its multiples fill an interval evenly, however many are taken
-
-
-@dataclass(frozen=True)
-class Handed:
-    """What the last sample of a shift hands on.
-
-    plans       shifted by a sample, the best first, shape (k, 2, N)
-    cost        of the best when it was chosen, in samples; nan where none was
-    turn        samples so far
-    """
-
-    plans: np.ndarray
-    cost: float
-    turn: int
 
 
 @dataclass(frozen=True)
@@ -73,21 +57,22 @@ class PlanSearch:
         x: np.ndarray,
         query: np.ndarray,
         sent: tuple[int, int],
-        last: Handed,
+        before: np.ndarray,
         suggested: np.ndarray,
+        turn: int,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Plans, shape (k, 2, N), and their costs in samples, rising.
 
-        ``suggested`` is asked beside those of the last sample, shape (2, N).
+        ``before`` are those of the last sample, shifted, the best first, shape (k, 2, N), and
+        ``suggested`` one more, shape (2, N).  ``turn`` counts the samples of a shift.
         """
-        before = last.plans
         others = before[1:][self.keep(sent, before[1:])]
         known = [before[:1], others, self.held(sent)[None], suggested[None]]
         near = np.concatenate([*known, moved(self.responses, sent, before[0])])
         near = near[: self.judged + 1 - RANKED]
         left = self.judged + 1 - len(near)
-        if not query[2] and (last.turn % 2 or self._lost(x, query, sent, last)):
-            far = self._spread(sent, last.turn, left + self.judged + 1)
+        if turn % 2 and not query[2]:
+            far = self._spread(sent, turn, left + self.judged + 1)
         else:
             far = self._ranked(x, query, sent, before[0])[:left]
         asked = np.concatenate([near, far])
@@ -100,14 +85,13 @@ class PlanSearch:
     ) -> np.ndarray:
         """Costs of plans by the nonlinear model, in samples, shape (n,).
 
-        One, or a multiple of judged + 1, is what compiled functions take; others are filled up.
+        A multiple of judged + 1 of them is what the compiled function takes; others are filled up.
         """
-        together = 1 if len(asked) == 1 else self.judged + 1
-        judge = self._calls[3 if together == 1 else 2]
-        filled = np.concatenate([asked, np.repeat(asked[-1:], -len(asked) % together, axis=0)])
+        missing = -len(asked) % (self.judged + 1)
+        filled = np.concatenate([asked, np.repeat(asked[-1:], missing, axis=0)])
         shares = np.stack(self._shares(sent, filled.transpose(1, 0, 2)), axis=-1)
-        parts = shares.reshape(-1, together * self.horizon * 2)
-        by_model = np.concatenate([judge(x, part, query)[0] for part in parts])
+        parts = shares.reshape(-1, (self.judged + 1) * self.horizon * 2)
+        by_model = np.concatenate([self._calls[2](x, part, query)[0] for part in parts])
         standing = np.broadcast_to(self.held(sent)[:, :1], (len(asked), 2, 1))
         switches = np.abs(np.diff(asked, axis=2, prepend=standing)).sum(axis=(1, 2))
         costs = by_model[: len(asked)] + self.price * switches
@@ -127,10 +111,6 @@ class PlanSearch:
     def plans(self, sent: int) -> Plans:
         """The blocked plans of one valve after these commands."""
         return plans(*self._free(sent))
-
-    def _lost(self, x: np.ndarray, query: np.ndarray, sent: tuple[int, int], last: Handed) -> bool:
-        """True where the last plan now costs clearly more than it was to."""
-        return bool(self.costs(x, query, sent, last.plans[:1])[0] > last.cost + LOST)
 
     def _free(self, sent: int) -> tuple[int, int, int, int]:
         """Level of a valve, samples until it may switch, least time between switches, and N."""
@@ -174,8 +154,7 @@ class PlanSearch:
     def _calls(self) -> tuple[Callable[..., list[np.ndarray]], ...]:
         """The functions of the prediction, ready to be called at every sample."""
         found = self.prediction
-        functions = found.linearised, found.ranked, found.judged, found.alone
-        return tuple(prepared(f) for f in functions)
+        return tuple(prepared(f) for f in (found.linearised, found.ranked, found.judged))
 
     def __getstate__(self) -> dict[str, object]:
         """Without what another process makes anew."""

@@ -1,9 +1,8 @@
-"""What a gearbox actuator does under switching valves, and what that costs: four functions.
+"""What a gearbox actuator does under switching valves, and what that costs: three functions.
 
-``judged`` runs plans through the model of :mod:`linearize.shift_sample` as it is and ``alone`` one
-plan, ``linearised`` gives its affine modes along one, and ``ranked`` the cost of every pair of
-plans under these modes, in which the effects of the two valves add up.  The cost is
-:mod:`controllers.shift_cost`.
+``judged`` runs plans through the model of :mod:`linearize.shift_sample` as it is, ``linearised``
+gives its affine modes along one plan, and ``ranked`` the cost of every pair of plans under these
+modes, in which the effects of the two valves add up.  The cost is :mod:`controllers.shift_cost`.
 """
 
 from __future__ import annotations
@@ -33,13 +32,11 @@ class ShiftPrediction:
     linearised    (x, shares (2, N)) -> positions and velocities (2 N,), their slopes (2 N, 2 N)
     ranked        (way (2 N,), D1, D2 (2 N, n), query, x) -> cost of plan i and j at n i + j
     judged        (x, shares (2, N k), query) -> cost (k,)
-    alone         the same of one plan
     """
 
     linearised: ca.Function
     ranked: ca.Function
     judged: ca.Function
-    alone: ca.Function
 
 
 def shift_prediction(
@@ -55,7 +52,6 @@ def shift_prediction(
         linearised=compiled(_linearised(free, horizon)),
         ranked=compiled(_ranked(stage, end, weights, plans)),
         judged=compiled(_judged(stopped, stage, end, weights, kept)),
-        alone=compiled(_judged(stopped, stage, end, weights, 1)),
     )
 
 

@@ -6,7 +6,7 @@ import pytest
 from controllers.design_file import design
 from controllers.hybrid_mpc import HybridMpcSpec
 from controllers.launches import RELEASED, pulse_pairs
-from controllers.plan_search import KEPT, LOST, Handed
+from controllers.plan_search import KEPT
 from controllers.shift_cost import stage_cost
 from controllers.shift_prediction import query
 from controllers.switching_plans import every_plan, moved
@@ -76,27 +76,12 @@ def test_a_sample_hands_on_different_plans_by_rising_cost(made, turn):
     x, asked = np.array([2e5, 1.2e5, -9e-3, 0.5]), query(0.0, -END_M)
     sent = (0b111111, 0)
     before = np.stack([np.ones((2, N), dtype=int), np.zeros((2, N), dtype=int)])
-    last = Handed(before, np.nan, turn)
-    plans, cost = made.search.best(x, asked, sent, last, made._full_drive(0.0, sent))
+    plans, cost = made.search.best(x, asked, sent, before, made._full_drive(0.0, sent), turn)
 
     assert 1 < len(plans) <= KEPT
     assert (np.diff(cost) >= 0.0).all()
     assert len(np.unique(plans.reshape(len(plans), -1), axis=0)) == len(plans)
     assert made.search.keep(sent, plans).all()
-
-
-def test_a_plan_that_costs_clearly_more_than_it_was_to_is_replaced_from_all_over(made):
-    x, asked = np.array([3.5e5, 2e5, -9e-3, 0.4]), query(0.0, -END_M)
-    sent = (0, 0b111111)
-    brake = np.stack([np.zeros(N, dtype=int), np.ones(N, dtype=int)])  # stays half-way
-    now = made.search.costs(x, asked, sent, brake[None])[0]
-
-    def cost(was):
-        last = Handed(brake[None], was, 0)
-        return made.search.best(x, asked, sent, last, brake)[1][0]
-
-    assert cost(now) == cost(np.nan) == cost(now - 0.9 * LOST)
-    assert cost(now - 1.1 * LOST) < 0.7 * cost(now)
 
 
 def test_what_may_not_be_switched_yet_is_no_plan(made):
