@@ -29,6 +29,7 @@ from workbench.plants.gearbox import FINGER_M, FLOATING, MAIN
 
 SAMPLE_TIME_S, LASTS_S, LATE_S = 2.5e-4, 0.08, 0.01
 SETTLED_M, OVERSHOT_M = 0.3e-3, 0.5e-3
+FEWER = 10  # plans judged at a sample, for a computer without time for all of them
 SLOWER, SOFTER, SOFT_M_S = 1.25, 0.5, 0.5
 NOISE = {**dict.fromkeys(PRESSURES, 1e3), POSITION: 2e-5}
 PROCESS = {
