@@ -56,8 +56,10 @@ class HybridMpcSpec:
         Samples ahead: a shift is braked in about 15 ms.
     hold_s
         Least time between two switches of a valve.
-    within_m, beyond_m, beyond_weight, landing_m_s, neutral_m_s, arriving_m_s, landing_s, end_s
+    within_m, beyond_m, beyond_weight, beyond_later, landing_m_s, neutral_m_s, arriving_m_s
         See :class:`controllers.shift_cost.ShiftCost`.
+    landing_s, end_s, brake_m_s2, brake_after_s
+        See there.
     switch_s
         Price of a switch: how long the whole way may take longer to save it.
     judged

@@ -42,7 +42,8 @@ class PlanSearch:
 
     responses, prediction    what the valves pass, and what the piston does under that
     horizon     N, samples
-    judged      plans that the nonlinear model judges at each sample, besides the last one
+    judged      plans that the nonlinear model judges at a sample that ranks others, besides the
+                last one; twice as many at one that does not
     price       of a switch, in samples of the whole way
     """
 

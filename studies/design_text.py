@@ -94,7 +94,8 @@ def search_text(made: HybridMpc) -> str:
     held = number(1e3 * spec.hold_s, 3)
     lines = [f"of {pairs} pairs of plans over {spec.horizon} samples, {held} ms between switches:"]
     judged = f"{spec.judged} of the best and of those near the last plan"
-    lines.append(f"ranked on affine modes; {judged} are judged as they are at each sample")
+    lines.append(f"ranked on affine modes; {judged} are judged as they are at a sample that ranks;")
+    lines.append("on the way to Neutral every second one judges some from all over instead")
     for place_m, commands in made.drives.items():
         sent = ", ".join(f"{c:g}" for c in commands)
         lines.append(f"commands {sent} lead to {number(1e3 * place_m, 3)} mm")

@@ -28,7 +28,9 @@ def improvement_text(found: Improvement, unit_of: Mapping[str, str]) -> str:
         for stage in found.budget
     ]
     parts = [columns(head, rows), ""]
-    parts += [f"diagnosis {k}: {d.sentence}" for k, d in enumerate(found.diagnoses, start=1)]
+    for k, diagnosis in enumerate(found.diagnoses, start=1):
+        parts += [f"diagnosis {k}: {diagnosis.sentence}"]
+        parts += [each.sentence for each in found.ahead if each.after == k]
     parts += [f"warning: {warning}" for warning in found.warnings]
     parts += thoughts_text(found)
     if found.law:
@@ -97,6 +99,7 @@ def improvement_document(found: Improvement, unit_of: Mapping[str, str]) -> Docu
             for stage in found.budget
         ],
         "diagnoses": [each.sentence for each in found.diagnoses],
+        "ahead": [each.sentence for each in found.ahead],
         "warnings": list(found.warnings),
         "removals": [
             {

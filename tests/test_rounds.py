@@ -5,7 +5,11 @@ inwards for most of what is held out.  Friction and a constant force add up outw
 alone is fitted with the size of both, and held out that is worse than nothing.
 """
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
+from scipy.signal import lfilter
 from test_pairs import strokes
 
 from workbench.diagnosis import diagnose as diagnosis
@@ -45,20 +49,76 @@ def test_an_effect_that_is_refused_alone_comes_in_with_the_next(rig, singly):
     assert set(found.kept) == {"coulomb_friction", "constant_force"}
     assert found.rig.plant.values["friction.coulomb_force_n"] == pytest.approx(FRICTION_N, rel=0.05)
     assert abs(found.rig.plant.values["constant_force.force_n"]) == pytest.approx(FORCE_N, rel=0.05)
-    assert [stage.label for stage in found.budget[1:3]] == [f"+ {name}" for name in found.kept]
+    assert [stage.label for stage in found.budget[1:]] == [f"+ {' + '.join(found.kept)}"]
     assert found.after["validation"]["rod.force"].rmse < 0.25
     assert any("one round further" in message for message in heard)
+    assert [each.sentence for each in found.ahead] == [
+        "one round further with coulomb_friction: comes in with constant_force"
+    ]
+    assert found.warnings == () and "unexplained" in first.warnings[0]
 
 
-def test_an_effect_that_is_refused_and_finds_no_second_one_is_not_added(rig, singly):
-    """Held out, friction is less and the force another: no two effects can say that."""
-    train, held_out = [recorded(1, 0.9)], [recorded(2, 0.9, 3.0, -5.0)]
-    heard = []
-    found = improve(rig, train, held_out, heard.append)
+def test_two_that_come_in_together_are_told_and_thought_over_like_a_pair(rig, singly):
+    """The first one's note is no longer that of the round which refused it."""
+    found = improve(rig, [recorded(1, 0.9)], [recorded(2, 0.1)])
 
-    assert any("one round further" in message for message in heard)
+    assert [note.partition(":")[0] for note in found.rig.notes] == [
+        "coulomb_friction, together with constant_force",
+        "constant_force, together with coulomb_friction",
+    ]
+    assert all("100% in validation" in note for note in found.rig.notes)
+    assert [each.candidate.name for each in found.removals] == list(found.kept)
+    assert {each.candidate.name for each in found.swaps} == set(found.kept)
+
+
+def refused_ahead(rig, train, held_out):
+    """What one round further says where it adds nothing."""
+    found = improve(rig, [train], [held_out])
+
     assert found.steps == found.kept == () and found.rig is rig
     assert len(found.diagnoses) == len(found.budget) == 1
+    assert "unexplained" in found.warnings[-1]
+    (ahead,) = found.ahead
+    assert ahead.after == 1 and ahead.name == "coulomb_friction"
+    return ahead.outcome
+
+
+def test_nothing_is_added_where_recordings_contradict_the_rig_one_round_further(rig, singly):
+    """Held out, friction is less and the force another: no two effects can say that."""
+    outcome = refused_ahead(rig, recorded(1, 0.9), recorded(2, 0.9, 3.0, -5.0))
+
+    assert outcome == "no effect passes every criterion on top of it"
+
+
+def waved(recording, seed, rms_n=9.0, memory_s=0.05):
+    """A force that wanders from zero without any cause."""
+    normal = np.random.default_rng(seed).standard_normal(len(recording))
+    normal[0] = 0.0
+    share = np.exp(-recording.sample_time_s / memory_s)
+    force = lfilter([np.sqrt(1.0 - share**2)], [1.0, -share], normal)
+    seen = {**recording.channels, "rod.force_n": recording["rod.force_n"] + rms_n * force}
+    return replace(recording, channels=seen)
+
+
+@pytest.mark.parametrize(("friction_n", "force_n"), [(4.85, 2.85), (5.3, 3.3)])
+def test_two_that_predict_hardly_better_than_neither_are_not_added(
+    rig, singly, friction_n, force_n
+):
+    """A spring earns its place beside the friction, and both together do not."""
+    train = waved(recorded(1, 0.9), 5)
+    outcome = refused_ahead(rig, train, waved(recorded(2, 0.5, friction_n, force_n), 6))
+
+    assert outcome.startswith(f"with spring_force it {HELD_OUT_REASON}")
+
+
+def test_an_interrupt_one_round_further_keeps_what_the_round_had_found(rig, singly):
+    def interrupted(message):
+        if message.startswith("one round further"):
+            raise KeyboardInterrupt
+
+    found = improve(rig, [recorded(1, 0.9)], [recorded(2, 0.1)], interrupted)
+
+    assert found.stopped and found.steps == () and len(found.diagnoses) == 1
 
 
 def test_two_effects_of_which_one_is_needless_beside_the_other_are_not_added(
@@ -68,6 +128,4 @@ def test_two_effects_of_which_one_is_needless_beside_the_other_are_not_added(
         return Removal(step.candidate, 0.0, 0.0, ("brings nothing",), True), kept
 
     monkeypatch.setattr(Passes, "removal", needless)
-    found = improve(rig, [recorded(1, 0.9)], [recorded(2, 0.1)])
-
-    assert found.steps == found.kept == ()
+    assert "brings nothing" in refused_ahead(rig, recorded(1, 0.9), recorded(2, 0.1))

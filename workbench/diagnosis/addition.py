@@ -12,7 +12,7 @@ from workbench.diagnosis.diagnose import Progress, silent
 from workbench.diagnosis.evidence import WARNINGS, Recordings, held_out, weighed
 from workbench.diagnosis.law import empirical_law, plant_with_terms
 from workbench.diagnosis.pairs import pair_fit
-from workbench.diagnosis.refit import refit, refit_shaken
+from workbench.diagnosis.refit import Refit, refit, refit_shaken
 from workbench.diagnosis.result import Diagnosis, Evidence, Law, Ranked, told
 from workbench.diagnosis.rough import rough_fit
 from workbench.diagnosis.scan import scan, scan_catalogue
@@ -88,12 +88,15 @@ def add(
     profiles = scan(problem.whole, base.windows, base.unknowns, base.point, candidates)
     begun = rough_fit(problem, profiles[0]) if len(names) == 1 else pair_fit(problem, profiles)
     found = refit_shaken(problem, refit(problem, begun))
+    return refitted_addition(rig, problem, found, weighed(evidence, problem.base_validation))
+
+
+def refitted_addition(rig: Rig, problem: Problem, found: Refit, evidence: Evidence) -> Addition:
+    """A refit as an addition to the rig of its problem, with its size settled."""
     fit = settled(found.fit, found.candidate)
-    before = errors_of(base, problem.base_validation)
+    before = errors_of(problem.base, problem.base_validation)
     drops = (found.drop_train, found.drop_validation)
-    evidence = weighed(evidence, problem.base_validation)
-    unseen = problem.validated(fit)
-    return addition(rig, before, found.candidate, fit, unseen, drops, evidence)
+    return addition(rig, before, found.candidate, fit, problem.validated(fit), drops, evidence)
 
 
 def _names_in(name: str) -> list[str]:

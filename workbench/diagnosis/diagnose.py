@@ -19,12 +19,12 @@ from workbench.diagnosis.dominance import dominant_first
 from workbench.diagnosis.evidence import WARNINGS, held_out, weighed
 from workbench.diagnosis.judge import (
     CERTAIN_SHARE,
-    CLEARLY_LESS,
     CLOSE_DROP_SAME,
     LEAST_TRAINING,
     SAME_DIRECTION,
     SHARE_REASON,
     alignment,
+    clearly_less,
     predicts,
     reasons_against,
     share_removed,
@@ -289,5 +289,6 @@ def _law(
         max((r.drop_train for r in followed if r.kind is kind), default=0.0)
         for kind in (Kind.EFFECT, Kind.PARAMETER)
     )
-    left = min((1.0 - CLEARLY_LESS) * (1.0 - effect), 1.0 - shift)
-    return law if law and 1.0 - law.drop_train < left else None
+    if law is None or not clearly_less(1.0 - law.drop_train, 1.0 - effect):
+        return None
+    return law if law.drop_train > shift else None

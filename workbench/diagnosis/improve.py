@@ -82,10 +82,7 @@ def _thought_over(
     progress: Progress,
 ) -> Rounds:
     """Backward pass, then swap pass; an interrupt keeps what is finished."""
-    rounds = [each for each in done.diagnoses if not each.contradicted and each.ranking]
-    rounds = [each for each in rounds if each.ranking[0].accepted]
-    accepted = {c.name: each for each in rounds for c in each.ranking[0].candidate.singles}
-    passes = Passes(done.rig, train, validation, accepted, progress)
+    passes = Passes(done.rig, train, validation, done.origins, progress, done.opened)
     try:
         for step in done.steps:
             done = _removed(done, passes, step)
@@ -177,6 +174,7 @@ def _improvement(
         diagnoses=done.diagnoses,
         removals=done.removals,
         swaps=done.swaps,
+        ahead=done.ahead,
         law=done.law,
         before=first.before,
         after=errors_of(fit, held_out),

@@ -9,6 +9,7 @@ from typing import NamedTuple
 from workbench.diagnosis.addition import Addition
 from workbench.diagnosis.passes import Removal, Swap
 from workbench.diagnosis.result import Diagnosis, Law
+from workbench.diagnosis.verdict import UNEXPLAINED
 from workbench.fitting.errors import Errors
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.posterior import Moved
@@ -35,6 +36,19 @@ class Stage(NamedTuple):
     change: Change = Change.ADDED
 
 
+class Ahead(NamedTuple):
+    """An effect that was tried for one round more: after how many diagnoses, and its outcome."""
+
+    after: int
+    name: str
+    outcome: str
+
+    @property
+    def sentence(self) -> str:
+        """All of it in words."""
+        return f"one round further with {self.name}: {self.outcome}"
+
+
 @dataclass(frozen=True)
 class Improvement:
     """Rounds of diagnosis and addition, second thoughts, and the rig that they end with.
@@ -44,7 +58,10 @@ class Improvement:
     steps
         What the rounds added, in order, the terms of a law at the end; also what was dropped later.
     diagnoses
-        One for each round; the last one accepted nothing, unless the user stopped it.
+        One for each round, and one more where an effect that a round had refused came in with the
+        next one; the last one accepted nothing, unless the user stopped it.
+    ahead
+        What was tried for one round more, also in vain.
     removals, swaps
         What the backward and the swap pass found, in order.
     law
@@ -70,6 +87,7 @@ class Improvement:
     diagnoses: tuple[Diagnosis, ...]
     removals: tuple[Removal, ...]
     swaps: tuple[Swap, ...]
+    ahead: tuple[Ahead, ...]
     law: Law | None
     before: Errors
     after: Errors
@@ -83,8 +101,10 @@ class Improvement:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the diagnoses warn of, each once."""
-        return tuple(dict.fromkeys(w for found in self.diagnoses for w in found.warnings))
+        """What the diagnoses warn of, each once; of errors that remain only the last one."""
+        *earlier, last = self.diagnoses
+        kept = [w for found in earlier for w in found.warnings if not w.startswith(UNEXPLAINED)]
+        return tuple(dict.fromkeys((*kept, *last.warnings)))
 
     @property
     def kept(self) -> tuple[str, ...]:

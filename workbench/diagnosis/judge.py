@@ -166,7 +166,8 @@ def tie_group(base: Fit, refits: list[Refit], profiles: dict[str, Profile]) -> l
     sound = [each for each in tied if not reasons_against(base, each)] or tied[:LARGEST_TIE]
     tied = tied[: max(len(sound), LARGEST_TIE)]
     effects = [each for each in sound if each.candidate.name in profiles] or sound
-    best, leader = effects[0], min(effects, key=left_held_out)
+    may_lead = [each for each in effects if predicts(each)] or effects
+    best, leader = may_lead[0], min(may_lead, key=left_held_out)
     if not clearly_less(left_held_out(leader), left_held_out(best)):
         leader = best
     others = [each for each in tied if each is not leader]

@@ -105,11 +105,15 @@ class _Opened:
     found: Refit
 
 
+Opened = dict[tuple[str, ...], _Opened]
+
+
 @dataclass(frozen=True)
 class Passes:
     """Backward and swap pass over a rig: its recordings, and the diagnosis of each acceptance.
 
-    ``diagnoses`` go by the public name of what was accepted.
+    ``diagnoses`` go by the public name of what was accepted; ``opened`` are the models without one
+    effect that are fitted already, by its name and those that are kept.
     """
 
     rig: Rig
@@ -117,7 +121,7 @@ class Passes:
     validation: Sequence[Recording]
     diagnoses: Mapping[str, Diagnosis]
     progress: Progress
-    opened: dict[tuple[str, ...], _Opened] = field(default_factory=dict, repr=False)
+    opened: Opened = field(default_factory=dict, repr=False)
 
     def removal(self, kept: Kept, step: Addition) -> tuple[Removal, Kept]:
         """Take one effect out: whether it earns its place, and what is kept after that."""

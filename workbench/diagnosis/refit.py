@@ -70,7 +70,7 @@ def refit_from(problem: Problem, candidate: Candidate, values: Mapping[str, floa
     """Fit a candidate from where a fit of the same effects ended, by its parameter values."""
     windows = windows_for(problem, candidate)
     unknowns = problem.unknowns(windows.plant, candidate)
-    shapes = [f"{candidate.member}.{key}" for key in candidate.cause.shapes]
+    shapes = [f"{c.member}.{key}" for c in candidate.singles for key in c.cause.shapes]
     held = {name: values[name] for name in shapes if name not in unknowns.names}
     unknowns = replace(unknowns, held={**unknowns.held, **held})
     t = unknowns.clipped(unknowns.scaled({**windows.plant.values, **values}))

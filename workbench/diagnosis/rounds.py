@@ -3,26 +3,44 @@
 A round adds what its diagnosis accepts first.  Where it accepts nothing, one effect may have failed
 on the held-out recording alone because a second one is missing too: what imitates the second in
 training misleads elsewhere.  So the effect that removes most, and at least half, is tried for one
-round more; it stays if that round accepts another on top of it, if both together predict better
-than neither, and if it then passes every criterion on top of that other one.
+round more.  Where that round accepts another effect on top of it, the two come in as a pair: if
+together they pass the criteria for a pair against the model without both and leave a fifth less
+held out, and each of them passes those of a single effect on top of the other.
 
 Source: diagnosis.md 1.9, 1.10 and 4.5 (accept, refit, scan again; judge the pair).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
-from workbench.diagnosis.addition import Addition, accept, addition_of, apart, assembled
+from workbench.candidate import Candidate, together
+from workbench.diagnosis.addition import (
+    Addition,
+    accept,
+    addition_of,
+    apart,
+    assembled,
+    refitted_addition,
+)
 from workbench.diagnosis.diagnose import Progress, diagnose
-from workbench.diagnosis.improvement import Change, Stage
-from workbench.diagnosis.judge import HELD_OUT_REASON, LEAST_HELD_OUT, SHARE_REASON
-from workbench.diagnosis.passes import Kept, Passes, Removal, Swap
+from workbench.diagnosis.improvement import Ahead, Change, Stage
+from workbench.diagnosis.judge import (
+    CLEARLY_LESS,
+    HELD_OUT_REASON,
+    SHARE_REASON,
+    clearly_less,
+    left_held_out,
+    reasons_against,
+)
+from workbench.diagnosis.passes import Kept, Opened, Passes, Removal, Swap
+from workbench.diagnosis.refit import Refit, refit_from, refit_shaken
 from workbench.diagnosis.result import Diagnosis, Law, Ranked
 from workbench.effect import Kind
-from workbench.fitting.errors import per_sample, plain_ratio
+from workbench.fitting.errors import per_sample
 from workbench.fitting.gauss_newton import Fit
+from workbench.fitting.problem import posed
 from workbench.recording import Recording
 from workbench.rig import Rig
 
@@ -32,7 +50,11 @@ PROMISES = 0.5  # of the misfit in training: an effect that removes less is not 
 
 @dataclass(frozen=True)
 class Rounds:
-    """How far the work has come."""
+    """How far the work has come.
+
+    ``origins`` is the diagnosis by which each effect came in, by its public name; ``opened`` are
+    models without one effect that are fitted already.
+    """
 
     rig: Rig
     kept: Kept | None = None
@@ -41,6 +63,9 @@ class Rounds:
     removals: tuple[Removal, ...] = ()
     swaps: tuple[Swap, ...] = ()
     budget: tuple[Stage, ...] = ()
+    ahead: tuple[Ahead, ...] = ()
+    origins: Mapping[str, Diagnosis] = field(default_factory=dict, repr=False)
+    opened: Opened = field(default_factory=dict, repr=False)
     law: Law | None = None
     stopped: bool = False
 
@@ -57,11 +82,20 @@ class Rounds:
         base = (diagnosis.base, diagnosis.base_validation)
         return done.marked(Change.START.value, *base, Change.START)
 
-    def added(self, step: Addition) -> Rounds:
-        """The same with one more addition, a pair as its two halves."""
-        steps = (*self.steps, *apart(step))
+    def looked(self, candidate: Candidate, outcome: str) -> Rounds:
+        """The same with what came of trying an effect for one round more."""
+        return replace(
+            self, ahead=(*self.ahead, Ahead(len(self.diagnoses), candidate.name, outcome))
+        )
+
+    def added(self, step: Addition, *origins: Diagnosis) -> Rounds:
+        """The same with one more addition, a pair as its two halves; each has an origin."""
+        halves = apart(step)
+        steps = (*self.steps, *halves)
         kept = Kept(steps, step.fit, step.validation_fit)
-        done = replace(self, steps=steps, kept=kept)
+        names = (half.candidate.name for half in halves)
+        known = {**self.origins, **dict(zip(names, origins, strict=True))}
+        done = replace(self, steps=steps, kept=kept, origins=known)
         label = f"+ {step.candidate.name}"
         return done.marked(label, step.fit, step.validation_fit, Change.ADDED)
 
@@ -115,9 +149,16 @@ def _round(done: Rounds, asked: _Asked) -> Rounds:
         return done
     if _accepts(diagnosis):
         asked.progress(f"accepted {diagnosis.ranking[0].candidate.name}")
-        return done.added(accept(current, diagnosis))
+        step = accept(current, diagnosis)
+        return done.added(step, *(diagnosis for _ in step.candidate.singles))
     hopeful = _promising(diagnosis)
-    return _further(done, addition_of(current, diagnosis, hopeful), asked) if hopeful else done
+    if hopeful is None:
+        return done
+    try:
+        return _further(done, current, hopeful, asked)
+    except KeyboardInterrupt:
+        asked.progress(f"stopped beside {hopeful.candidate.name}: what is finished stays")
+        return replace(done, stopped=True)
 
 
 def _accepts(diagnosis: Diagnosis) -> bool:
@@ -134,27 +175,50 @@ def _promising(diagnosis: Diagnosis) -> Ranked | None:
     refused = [
         row
         for row in diagnosis.ranking
-        if row.fit is not None and row.kind is Kind.EFFECT and row.drop_train >= PROMISES
+        if row.fit is not None and _is_effect(row) and row.drop_train >= PROMISES
         and {HELD_OUT_REASON} <= {*row.reasons} <= {HELD_OUT_REASON, SHARE_REASON}
-        and row.candidate.singles == (row.candidate,)
     ]  # fmt: skip
     return max(refused, key=lambda row: row.drop_train, default=None)
 
 
-def _further(done: Rounds, step: Addition, asked: _Asked) -> Rounds:
-    """What a refused effect and the next one after it do together; as it was where they fail."""
-    asked.progress(f"one round further with {step.candidate.name}")
-    tried, without = done.added(step), done.diagnoses[-1].base_validation
-    current = assembled(tried.rig, tried.steps)
-    second = asked.diagnosis(current)
-    if second.contradicted or not _accepts(second):
-        return done
-    both = tried.told(second).added(accept(current, second))
-    if not plain_ratio(without, both.kept.validation) < 1.0 - LEAST_HELD_OUT:
-        return done  # better than with a bad one alone, but no better than without
-    passes = Passes(done.rig, asked.train, asked.validation, {}, asked.progress)
-    removal, _ = passes.removal(both.kept, step)
-    if removal.dropped:
-        return done
-    asked.progress(f"accepted {step.candidate.name} and {second.ranking[0].candidate.name}")
+def _further(done: Rounds, current: Rig, row: Ranked, asked: _Asked) -> Rounds:
+    """A refused effect with the next one that passes on top of it; as it was where they fail."""
+    first, refused = done.diagnoses[-1], row.candidate
+    asked.progress(f"one round further with {refused.name}")
+    steps = (*done.steps, addition_of(current, first, row))
+    second = asked.diagnosis(assembled(done.rig, steps))
+    if second.contradicted or not _accepts(second) or not _is_effect(second.ranking[0]):
+        return done.looked(refused, "no effect passes every criterion on top of it")
+    leader = second.ranking[0]
+    problem = posed(current, asked.train, first.base, first.base_validation)
+    pair = together(refused, leader.candidate)
+    asked.progress(f"refit with {pair.name}")
+    found = refit_shaken(problem, refit_from(problem, pair, leader.fit.plant.values))
+    if against := _against_both(problem.base, found):
+        return done.looked(refused, f"with {leader.candidate.name} it {'; '.join(against)}")
+    step = refitted_addition(current, problem, found, first.evidence)
+    both = done.looked(refused, f"comes in with {leader.candidate.name}")
+    both = both.told(second).added(step, first, second)
+    passes = Passes(
+        done.rig, asked.train, asked.validation, both.origins, asked.progress, done.opened
+    )
+    for half in both.kept.steps[-2:]:
+        removal, _ = passes.removal(both.kept, half)
+        if removal.dropped:
+            name, why = removal.candidate.name, "; ".join(removal.reasons)
+            return done.looked(refused, f"with {leader.candidate.name}, {name} {why}")
+    asked.progress(f"accepted {pair.name}")
     return both
+
+
+def _against_both(base: Fit, found: Refit) -> tuple[str, ...]:
+    """The criteria that a pair fails; it has to predict clearly better, as its half did not."""
+    against = reasons_against(base, found)
+    if against or clearly_less(left_held_out(found), 1.0):
+        return against
+    return (f"{HELD_OUT_REASON} by {CLEARLY_LESS:.0%}",)
+
+
+def _is_effect(row: Ranked) -> bool:
+    """True for a single effect: no pair, and no shift of a parameter."""
+    return row.kind is Kind.EFFECT and row.candidate.singles == (row.candidate,)

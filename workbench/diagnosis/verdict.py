@@ -12,6 +12,7 @@ from workbench.fitting.errors import errors_of
 from workbench.fitting.gauss_newton import Fit
 
 FAR_ABOVE_NOISE = 3.0  # RMSE over noise that is worth a word where nothing is named
+UNEXPLAINED = "unexplained errors remain on held-out windows"
 BLIND_SHOWN = 4  # names of what a recording cannot show
 
 
@@ -78,7 +79,7 @@ def unexplained(far: Sequence[str], verdict: Verdict) -> tuple[str, ...]:
     """A warning where nothing is named and the error stays far above the noise all the same."""
     if not far or verdict in NAMING or verdict is Verdict.NOT_IN_CATALOGUE:
         return ()
-    return (f"unexplained errors remain on held-out windows: {', '.join(far)}",)
+    return (f"{UNEXPLAINED}: {', '.join(far)}",)
 
 
 def sentence(

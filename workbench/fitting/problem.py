@@ -183,6 +183,12 @@ def pose(
     return Problem(rig, whole, added, base, held_out)
 
 
+def posed(rig: Rig, train: Sequence[Recording], base: Fit, base_validation: Fit | None) -> Problem:
+    """A problem whose fits are there already, those of a diagnosis of the rig."""
+    whole = rig.fit_for(train[0])
+    return Problem(rig, whole, rig.added_to(whole), base, base_validation)
+
+
 def fitted_twice(windows: Windows, unknowns: Unknowns, t: np.ndarray) -> Fit:
     """A fit from scaled unknowns (n_p,), the second time with the error model of the first."""
     start = Point(t, windows.start)
