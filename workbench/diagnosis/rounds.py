@@ -197,18 +197,24 @@ def _further(done: Rounds, current: Rig, row: Ranked, asked: _Asked) -> Rounds:
     if against := _against_both(problem.base, found):
         return done.looked(refused, f"with {leader.candidate.name} it {'; '.join(against)}")
     step = refitted_addition(current, problem, found, first.evidence)
-    both = done.looked(refused, f"comes in with {leader.candidate.name}")
-    both = both.told(second).added(step, first, second)
+    both = done.told(second).added(step, first, second)
+    if needless := _needless(both, asked):
+        return done.looked(refused, f"with {leader.candidate.name}, {needless}")
+    asked.progress(f"accepted {pair.name}")
+    ahead = done.looked(refused, f"comes in with {leader.candidate.name}").ahead
+    return replace(both, ahead=ahead)
+
+
+def _needless(both: Rounds, asked: _Asked) -> str:
+    """Which half of the pair added last fails a criterion on top of the other, and which one."""
     passes = Passes(
-        done.rig, asked.train, asked.validation, both.origins, asked.progress, done.opened
+        both.rig, asked.train, asked.validation, both.origins, asked.progress, both.opened
     )
     for half in both.kept.steps[-2:]:
         removal, _ = passes.removal(both.kept, half)
         if removal.dropped:
-            name, why = removal.candidate.name, "; ".join(removal.reasons)
-            return done.looked(refused, f"with {leader.candidate.name}, {name} {why}")
-    asked.progress(f"accepted {pair.name}")
-    return both
+            return f"{half.candidate.name} {'; '.join(removal.reasons)}"
+    return ""
 
 
 def _against_both(base: Fit, found: Refit) -> tuple[str, ...]:
