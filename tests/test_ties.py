@@ -92,6 +92,20 @@ def test_a_rival_that_a_few_held_out_windows_refuse_stays_in_the_tie(problem, fo
         assert group[0] == leader.candidate
 
 
+def test_what_the_held_out_recording_refuses_leads_nothing_that_it_does_not(
+    problem, followed, sound
+):
+    """Nobody passes: the first removes too little, the other spoils a few held-out windows."""
+    first = replace(sound, drop_train=0.15, drop_validation=0.2)
+    spoilt = replace(
+        named(sound, followed, 0), drop_train=0.6, drop_validation=0.5, plain_validation=2.3
+    )
+    group = tie_group(problem.base, [first, spoilt], {})
+
+    assert reasons_against(problem.base, first) == (SHARE_REASON,)
+    assert [each.candidate for each in group] == [first.candidate, spoilt.candidate]
+
+
 @pytest.mark.parametrize(
     ("share", "verdict"), [(0.04, Verdict.NOTHING_MISSING), (0.15, Verdict.SMALL_PROXY)]
 )
