@@ -168,13 +168,13 @@ def _claims_of_flow(
 def _static_figure(plant: Plant, curves: list[Curve]):
     fine_v = np.linspace(STATIC_V[0], STATIC_V[-1], 200)
     lines = []
-    for curve, side, colour, marker in zip(
-        curves, (1.0, -1.0), (BLUE, RED), ("o", "s"), strict=True
+    for curve, side, colour, marker, style in zip(
+        curves, (1.0, -1.0), (BLUE, RED), ("o", "s"), ("-", "--"), strict=True
     ):
         name = curve.chamber.replace("_", " ")
         lines.append(Line(STATIC_V, 1e-5 * curve.pressure_pa, name, marker, colour))
         fitted_pa = input_pressure_pa(plant, fine_v, curve.fit.values, side)
-        lines.append(Line(fine_v, 1e-5 * fitted_pa, f"{name}, fitted", "-", colour))
+        lines.append(Line(fine_v, 1e-5 * fitted_pa, f"{name}, fitted", style, colour))
     panel = Panel("command (V)", "pressure at rest (bar)", lines)
     return panels_figure([[panel]], COLUMN_IN, 2.9, legend_columns=2)
 
@@ -184,13 +184,22 @@ def _area_figure(plant: Plant, found: Areas, command_v: np.ndarray, flows: dict[
     plain = replace(valve_of(plant), discharge_coefficient=1.0, discharge_asymmetry=0.0)
     hole = 1e6 * plain.equivalent_area_m2(ca.DM(fine)).full().ravel()
     lines = []
-    for k, (name, area, colour, marker) in enumerate(
-        (("charging", found.charging, BLUE, "o"), ("discharging", found.discharging, RED, "s"))
+    for k, (name, area, colour, marker, segment, polynomial) in enumerate(
+        (
+            ("charging", found.charging, BLUE, "o", "-", "--"),
+            ("discharging", found.discharging, RED, "s", "-.", ":"),
+        )
     ):
         lines += [
             Line(OPENED_V, 1e6 * area, f"{name}, single steps", marker, colour),
-            Line(fine, found.coefficients[k] * hole, f"{name}, segment", "-", colour),
-            Line(fine, np.polyval(found.polynomials[k], fine), f"{name}, 5th order", "--", GREEN),
+            Line(fine, found.coefficients[k] * hole, f"{name}, segment", segment, colour),
+            Line(
+                fine,
+                np.polyval(found.polynomials[k], fine),
+                f"{name}, 5th order",
+                polynomial,
+                GREEN,
+            ),
         ]
     left = Panel("command beyond the offset (V)", r"equivalent area (mm$^2$)", lines)
     right = Panel(
