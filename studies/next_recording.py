@@ -42,14 +42,19 @@ class Separation:
 
     @property
     def left(self) -> tuple[str, ...]:
-        """Those of them that stand beside the hidden effect still, all where it does not lead.
+        """Those of them that stand beside the hidden effect still, all where it does not pass.
 
-        A new one may stand there too: a longer stroke shows more of what always is there.
+        A longer stroke shows more of what always is there.  Where that leads, the hidden effect
+        comes next, and every rival that passes too stands beside it.
         """
-        leader = self.after.ranking[0] if self.after else None
-        if leader is None or not leader.accepted or leader.candidate.name != self._name:
+        passing = [r for r in self.after.ranking if r.accepted] if self.after else []
+        names = [row.candidate.name for row in passing]
+        if self._name not in names:
             return self.asked
-        return tuple(rival for rival in self.asked if rival in _alike(self.after))
+        if names[0] == self._name:
+            return tuple(rival for rival in self.asked if rival in _alike(self.after))
+        others = [name for name in names[: names.index(self._name)] if not _always_there(name)]
+        return self.asked if others else tuple(r for r in self.asked if r in names)
 
     @property
     def _name(self) -> str:
@@ -60,6 +65,10 @@ def _alike(found: Diagnosis | None) -> tuple[str, ...]:
     """What the leader of a ranking is not told from."""
     leader = found.ranking[0] if found and found.ranking else None
     return (*leader.tied_with, *leader.crowd) if leader else ()
+
+
+def _always_there(name: str) -> bool:
+    return name.partition("@")[0] in SERVO_DRIVE.always_there
 
 
 def recorded(case: Case, asked: NextRecording) -> Recording:

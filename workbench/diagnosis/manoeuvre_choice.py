@@ -35,7 +35,7 @@ FOLLOWED = 3  # manoeuvres beyond the first look
 
 Plants = Mapping[str, Fit]
 Pairs = tuple[tuple[str, str], ...]
-Distances = Callable[[Sequence[Rehearsed], int], np.ndarray]
+Distances = Callable[[Sequence[Rehearsed]], np.ndarray]
 Worth = Callable[[np.ndarray], np.ndarray]
 
 
@@ -49,18 +49,18 @@ def least_gain(more: int = 0, samples: float = 1.0) -> float:
 
 
 def chosen(
-    rehearsed: Sequence[Rehearsed], distances: Distances, worth: Worth
+    rehearsed: Sequence[Rehearsed], first_look: Distances, decisive: Distances, worth: Worth
 ) -> tuple[Rehearsed, np.ndarray]:
     """The manoeuvre of most worth with its T of each pair, (n_pairs,).
 
-    ``distances`` gives T (n_manoeuvres, n_pairs) from so many windows, ``worth`` (n_manoeuvres,)
-    from that.  A first look at few windows of all is followed by one at more windows of the best.
+    Both looks give T (n_manoeuvres, n_pairs), the first of all and the decisive one of the best,
+    which are few; ``worth`` is (n_manoeuvres,) from that.
     """
-    rough = worth(distances(rehearsed, FIRST_WINDOWS))
+    rough = worth(first_look(rehearsed))
     followed = [rehearsed[k] for k in np.argsort(-rough, kind="stable")[:FOLLOWED]]
-    exact = distances(followed, WINDOWS)
-    best = int(worth(exact).argmax())
-    return followed[best], exact[best]
+    found = decisive(followed)
+    best = int(worth(found).argmax())
+    return followed[best], found[best]
 
 
 def inside(fits: Sequence[Fit], limits: Limits, library: Sequence[Manoeuvre]) -> list[Rehearsed]:

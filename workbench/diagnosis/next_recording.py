@@ -16,7 +16,15 @@ from itertools import combinations
 import numpy as np
 
 from workbench.diagnosis.judge import effective_samples
-from workbench.diagnosis.manoeuvre_choice import Plants, asked_for, chosen, inside, least_gain
+from workbench.diagnosis.manoeuvre_choice import (
+    FIRST_WINDOWS,
+    WINDOWS,
+    Plants,
+    asked_for,
+    chosen,
+    inside,
+    least_gain,
+)
 from workbench.diagnosis.result import NextRecording, Ranked, Verdict
 from workbench.diagnosis.rivals import distances
 from workbench.diagnosis.showing import NOTHING, showing
@@ -84,7 +92,12 @@ def next_recording(rivals: Plants, library: Sequence[Manoeuvre] = LIBRARY) -> Ne
         told = (found >= least).any(axis=0)
         return (found[:, told] if told.any() else found).min(axis=1)
 
-    best, exact = chosen(rehearsed, lambda few, most: distances(fits, few, most), gain)
+    best, exact = chosen(
+        rehearsed,
+        lambda few: distances(fits, few, FIRST_WINDOWS),
+        lambda few: distances(fits, few, WINDOWS, settled=True),
+        gain,
+    )
     if (exact < least).all():
         return None
     pairs = zip(combinations(rivals, 2), exact < least, strict=True)

@@ -25,11 +25,14 @@ from workbench.fitting.error_model import OUTLYING
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.linearised import Linearised, Point, borrowed, linearise
 from workbench.fitting.posterior import posterior_covariance
+from workbench.fitting.start_states import refit_starts
 from workbench.fitting.unknowns import Unknowns
 from workbench.fitting.window_cuts import cut_rows, evenly
 from workbench.fitting.windows import Windows
 from workbench.manoeuvres.play import Manoeuvre, Play
 from workbench.recording import Recording
+
+STEPS = 4  # of start states
 
 Near = tuple[Linearised, tuple[Windows, Unknowns]]  # derivatives and what they belong to
 
@@ -48,12 +51,15 @@ def distances(
     rehearsed: Sequence[Rehearsed],
     most: int | None = None,
     pairs: Iterable[tuple[int, int]] | None = None,
+    settled: bool = False,
 ) -> np.ndarray:
     """T of each manoeuvre for each pair of rivals, shape (n_manoeuvres, n_pairs).
 
     ``fits`` are the rivals, the likeliest first; the typical errors of that one weigh residuals.
     ``most`` bounds the windows of each manoeuvre; T counts as of all.  Of each of the ``pairs`` the
     first is to explain what the second would record; by default all combinations of two, in order.
+    With ``settled`` start states are fitted before the linear model is made: across a break-away it
+    holds nowhere, and rivals seem ten times as far apart in a slow triangle as they are.
     """
     errors = fits[0].windows.rescaled(fits[0].residual)
     columns: list[list[float]] = []
@@ -66,7 +72,7 @@ def distances(
         both = [(each.recorded[j], each.recorded[k]) for each in rehearsed]
         windows, of_all = _windows(fit, both, most)
         windows = windows.scaled_like(errors)
-        at = _derivatives(windows, fit, near)
+        at = _settled(windows, fit) if settled else _derivatives(windows, fit, near)
         near = near or (at, (windows, fit.unknowns))
         owner = np.repeat(np.arange(len(rehearsed)), [len(own) for own in windows.firsts])
         most_chi2 = OUTLYING**2 * np.sum(windows.length / windows.correlation, axis=0)
@@ -88,6 +94,12 @@ def _derivatives(windows: Windows, fit: Fit, near: Near | None) -> Linearised:
     if near is None or not set(near[1][0].plant.state_list) <= set(windows.plant.state_list):
         return linearise(windows, fit.unknowns, point)
     return borrowed(*near, windows, fit.unknowns, point)
+
+
+def _settled(windows: Windows, fit: Fit) -> Linearised:
+    """Residuals and derivatives where a rival's start states fit best, at its own parameters."""
+    starts = refit_starts(windows, fit.plant.values, iterations=STEPS).point.starts
+    return linearise(windows, fit.unknowns, Point(fit.point.t, starts))
 
 
 def distance(at: Linearised, precision: np.ndarray, most: np.ndarray, of_all: float = 1.0) -> float:

@@ -19,7 +19,14 @@ import numpy as np
 
 from workbench.candidate import Candidate
 from workbench.diagnosis.judge import LEAST_SHARE, effective_samples
-from workbench.diagnosis.manoeuvre_choice import asked_for, chosen, inside, least_gain
+from workbench.diagnosis.manoeuvre_choice import (
+    FIRST_WINDOWS,
+    WINDOWS,
+    asked_for,
+    chosen,
+    inside,
+    least_gain,
+)
 from workbench.diagnosis.result import NextRecording, Ranked
 from workbench.diagnosis.rivals import distances
 from workbench.diagnosis.rough import windows_for
@@ -60,7 +67,8 @@ def showing(
     pairs = [(0, k) for k in range(1, len(fits))]
     best, shown = chosen(
         rehearsed,
-        lambda few, most: distances(fits, few, most, pairs),
+        lambda few: distances(fits, few, FIRST_WINDOWS, pairs),
+        lambda few: distances(fits, few, WINDOWS, pairs),
         lambda found: np.minimum(found / needs, 1.0).sum(axis=1),
     )
     seen = shown >= needs
