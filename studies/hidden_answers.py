@@ -129,6 +129,6 @@ def counted(
             continue
         if alike:
             left.remove(alike[0])
-        elif name.partition("@")[0] not in bench.always_there:
+        elif not bench.always_has(name):
             wrong += 1
     return len(hidden) - len(left), wrong

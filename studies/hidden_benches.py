@@ -46,6 +46,10 @@ class Bench:
     places: Mapping[str, str] = field(default_factory=dict)
     sample_time_s: float = 1e-3
 
+    def always_has(self, name: str) -> bool:
+        """True for a small difference that every truth has, by its public name with its place."""
+        return name.partition("@")[0] in self.always_there
+
     @property
     def plant(self) -> str:
         """The plant's name in the workbench, and in the cases."""

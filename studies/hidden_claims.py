@@ -123,7 +123,7 @@ def _laws(rows: Sequence[Row], enough: Enough) -> Iterator[Claim]:
 
 def _is_there(row: Row) -> bool:
     """Whether what is named, or tied with it, really is there: hidden, or a small difference."""
-    return row.tied or row.first.partition("@")[0] in BENCHES[row.plant].always_there
+    return row.tied or BENCHES[row.plant].always_has(row.first)
 
 
 def _right(rows: Sequence[Row]) -> list[bool]:

@@ -48,7 +48,7 @@ class Answer:
         """Whether it names one of the small differences that every truth of the plant has."""
         if self.diagnosis.verdict not in (Verdict.FOUND, Verdict.TIE):
             return False
-        return self.named.partition("@")[0] in bench_of(self.case).always_there
+        return bench_of(self.case).always_has(self.named)
 
     @property
     def ties_a_difference(self) -> bool:

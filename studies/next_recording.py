@@ -53,7 +53,9 @@ class Separation:
             return self.asked
         if names[0] == self._name:
             return tuple(rival for rival in self.asked if rival in _alike(self.after))
-        others = [name for name in names[: names.index(self._name)] if not _always_there(name)]
+        others = [
+            name for name in names[: names.index(self._name)] if not SERVO_DRIVE.always_has(name)
+        ]
         return self.asked if others else tuple(r for r in self.asked if r in names)
 
     @property
@@ -65,10 +67,6 @@ def _alike(found: Diagnosis | None) -> tuple[str, ...]:
     """What the leader of a ranking is not told from."""
     leader = found.ranking[0] if found and found.ranking else None
     return (*leader.tied_with, *leader.crowd) if leader else ()
-
-
-def _always_there(name: str) -> bool:
-    return name.partition("@")[0] in SERVO_DRIVE.always_there
 
 
 def recorded(case: Case, asked: NextRecording) -> Recording:
