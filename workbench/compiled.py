@@ -12,6 +12,7 @@ installs it there.
 
 from __future__ import annotations
 
+import ctypes
 import hashlib
 import logging
 import os
@@ -21,13 +22,17 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Callable
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TypeVar
 
 import casadi as ca
 
 log = logging.getLogger("workbench")
+
+T = TypeVar("T")
 
 # No contraction to fused multiply-add: results stay equal to the last bit on every processor.
 # CasADi 3.8 copies empty inputs through an integer 0, which new compilers refuse by default.
@@ -46,8 +51,7 @@ def compiled(function: ca.Function) -> ca.Function:
     try:
         return _loaded(function, compiler)
     except (OSError, RuntimeError, subprocess.SubprocessError) as error:
-        reason = getattr(error, "stderr", None) or str(error)
-        log.warning("%s is not compiled: %s", function.name(), reason.strip()[:300])
+        _say_not_compiled(function.name(), error)
         return function
 
 
@@ -65,28 +69,60 @@ def _compiler(wanted: str, forbidden: str) -> tuple[str, ...]:
     return ()
 
 
-def _loaded(function: ca.Function, compiler: tuple[str, ...]) -> ca.Function:
-    """The function from its library, which is compiled once more if it is damaged."""
-    library = _library(function, compiler)
+def loaded(name: str, code: str, flags: tuple[str, ...]) -> ctypes.CDLL | None:
+    """A library of C written elsewhere, for the machine that this runs on.
+
+    None where there is no compiler, or none that compiles it; the latter is said.
+    """
+    compiler = _compiler(os.environ.get("CC", ""), os.environ.get("WORKBENCH_NO_COMPILER", ""))
+    if not compiler:
+        return None
     try:
-        return ca.external(function.name(), str(library))
-    except RuntimeError:
-        library.unlink(missing_ok=True)
-        return ca.external(function.name(), str(_library(function, compiler)))
+        command = (*compiler, "-O2", *FLAGS, *flags)
+        return _opened(lambda: _made(name, code, command, _machine(compiler, flags)), ctypes.CDLL)
+    except (OSError, subprocess.SubprocessError) as error:
+        _say_not_compiled(name, error)
+        return None
+
+
+def _opened(made: Callable[[], Path], opened: Callable[[str], T]) -> T:
+    """What is in a library, which is compiled once more if it is damaged."""
+    path = made()
+    try:
+        return opened(str(path))
+    except (OSError, RuntimeError):
+        path.unlink(missing_ok=True)
+        return opened(str(made()))
+
+
+def _say_not_compiled(name: str, error: Exception) -> None:
+    reason = getattr(error, "stderr", None) or str(error)
+    log.warning("%s is not compiled: %s", name, reason.strip()[:300])
+
+
+def _loaded(function: ca.Function, compiler: tuple[str, ...]) -> ca.Function:
+    """The function from its library."""
+    name = function.name()
+    return _opened(lambda: _library(function, compiler), lambda path: ca.external(name, path))
 
 
 def _library(function: ca.Function, compiler: tuple[str, ...]) -> Path:
-    """Path of the shared library, made unless it is there already."""
+    """Path of the shared library of a function, made unless it is there already."""
     generator = ca.CodeGenerator(function.name())
     generator.add(function)
     code = generator.dump()
     command = (*compiler, "-O1" if len(code) > LONG_CODE else "-O2", *FLAGS)
-    made_by = (_version(compiler), *command, platform.machine())
+    return _made(function.name(), code, command, _version(compiler))
+
+
+def _made(name: str, code: str, command: tuple[str, ...], by: str) -> Path:
+    """Path of the library of this code, which is kept under all that it is made of and ``by``."""
+    made_by = (by, *command, platform.machine())
     key = hashlib.sha256("\n".join((*made_by, code)).encode()).hexdigest()[:32]
-    library = _folder() / f"{function.name()}_{key}.so"
-    if not library.exists():
-        _compile(code, library, command)
-    return library
+    path = _folder() / f"{name}_{key}.so"
+    if not path.exists():
+        _compile(code, path, command)
+    return path
 
 
 def _compile(code: str, library: Path, command: tuple[str, ...]) -> None:
@@ -114,6 +150,14 @@ def _version(compiler: tuple[str, ...]) -> str:
     except (OSError, subprocess.SubprocessError):
         return ""
     return "" if answer.returncode else answer.stdout + answer.stderr
+
+
+@cache
+def _machine(compiler: tuple[str, ...], flags: tuple[str, ...]) -> str:
+    """What a compiler takes the machine for under these flags: all that it defines."""
+    answer = _run([*compiler, *flags, "-dM", "-E", "-x", "c", os.devnull])
+    answer.check_returncode()
+    return answer.stdout
 
 
 def _run(command: list[str]) -> subprocess.CompletedProcess[str]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from workbench.compiled import compiled
 from workbench.effect import Conditions, Expression, MassFlow, Term
+from workbench.lockstep import Lockstep, lockstep
 from workbench.rosenbrock import controlled_step
 
 BLOCK = 20  # samples of one call
@@ -66,6 +67,7 @@ class Model:
     _steps: dict[float, ca.Function] = field(default_factory=dict, repr=False)
     _compiled: dict[float, ca.Function] = field(default_factory=dict, repr=False)
     _blocks: dict[float, ca.Function] = field(default_factory=dict, repr=False)
+    _lockstep: dict[float, Lockstep | None] = field(default_factory=dict, repr=False)
 
     @cached_property
     def f(self) -> ca.Function:
@@ -127,6 +129,12 @@ class Model:
         if sample_time_s not in self._blocks:
             self._blocks[sample_time_s] = compiled(self.block(sample_time_s))
         return self._blocks[sample_time_s]
+
+    def lockstep(self, sample_time_s: float) -> Lockstep | None:
+        """Outputs of many windows side by side in lanes; None where that cannot be had."""
+        if sample_time_s not in self._lockstep:
+            self._lockstep[sample_time_s] = lockstep(self, sample_time_s) if self.states else None
+        return self._lockstep[sample_time_s]
 
 
 def flow_paths(flows: Iterable[tuple[str, Term]]) -> tuple[FlowPath, ...]:

@@ -50,7 +50,7 @@ def controlled_step(
     above which it is done again in finer steps (root of the sum of squares of error / tolerance).
     """
     x, u, d, p = (ca.MX.sym(k, s.numel()) for k, s in zip("xudp", symbols, strict=True))
-    trial = _trial(symbols, rates, tolerances)
+    trial = checked_step(symbols, rates, tolerances)
     advance = _last(trial)
     for _ in range(LEVELS - 1):
         advance = _refined(trial, advance)
@@ -64,7 +64,7 @@ def steps_of(sample_time_s: float, coarsest_s: float = COARSEST_STEP_S) -> int:
     return max(ceil(sample_time_s / coarsest_s - 1e-9), 1)
 
 
-def _trial(symbols: tuple[ca.SX, ...], rates: ca.SX, tolerances: np.ndarray) -> ca.Function:
+def checked_step(symbols: tuple[ca.SX, ...], rates: ca.SX, tolerances: np.ndarray) -> ca.Function:
     """(x, held, h) -> (x after h seconds, true where the error passes); held is (u, d, p)."""
     x, *inputs = symbols
     held, h = ca.SX.sym("held", sum(s.numel() for s in inputs)), ca.SX.sym("h")

@@ -19,13 +19,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from workbench.called import result
 from workbench.fitting.error_model import ACTIVE
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.noise import NoNoiseError, measured_noise
 from workbench.fitting.starts import long_holes, sensed_states
-from workbench.fitting.window_cuts import cut_rows, received_windows, window_firsts, window_run
+from workbench.fitting.window_cuts import cut_rows, received_windows, window_firsts
 from workbench.fitting.window_length import window_length_s
+from workbench.fitting.window_runs import WindowRuns
 from workbench.fitting.windows import Windows
 from workbench.plant import Plant
 from workbench.recording import Recording
@@ -98,8 +98,9 @@ def _simulated(plant: Plant, readings: Sequence[Recording], where: Probe) -> np.
     absurd = (np.abs(x0) > ABSURD * (plant.scale + np.abs(plant.initial))[:, None]).any(axis=0)
     x0 = np.where(absurd, plant.initial[:, None], x0)
     p = np.tile(plant.nominal[2][:, None], count)
-    run = window_run(plant, dt, length).map(count)
-    sent = result(run, x0, u, d, p).reshape(len(plant.measured), count, length)
+    runs = WindowRuns(plant.model, dt, length)
+    y = runs.outputs(x0, u, d, p, alike=len(firsts))
+    sent = y.reshape(len(plant.measured), count, length)
     sent[:, absurd] = np.nan
     return received_windows(plant, sent, (firsts,) * len(readings), dt)
 

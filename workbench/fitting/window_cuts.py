@@ -1,53 +1,18 @@
-"""How recordings are cut into windows, and the simulation of one window."""
+"""How recordings are cut into windows."""
 
 from __future__ import annotations
 
 from collections.abc import Collection
 
-import casadi as ca
 import numpy as np
 
 from workbench.effects.timing import sent_at_s
 from workbench.fitting.starts import guessed_states
-from workbench.model import Model
 from workbench.plant import Plant
 from workbench.recording import Recording
 from workbench.simulation import inputs
 
 FURTHEST_BACK = 3.0  # samples before its start to which a window is extrapolated
-
-
-def window_run(plant: Plant, sample_time_s: float, length: int) -> ca.Function:
-    """(x0, u, d, p) -> outputs over one window; u, d of L columns, result (n_y, L).
-
-    ``x0`` is the start as the sensors show it; see :class:`Windows`.
-    """
-    model = plant.model
-    x0, u, d, p = (
-        ca.MX.sym(name, symbol.numel(), columns)
-        for name, symbol, columns in zip("xudp", model.symbols, (1, length, length, 1), strict=True)
-    )
-    x = _behind_sensors(model, x0, u[:, 0], d[:, 0], p)
-    if model.states:
-        later = model.run(sample_time_s, length - 1)
-        x = ca.horzcat(x, later(x, u[:, :-1], d[:, :-1], p))
-    else:
-        x = ca.MX(0, length)
-    y = model.h.map(length)(x, u, d, ca.repmat(p, 1, length))
-    return ca.Function("window", [x0, u, d, p], [y])
-
-
-def _behind_sensors(model: Model, seen: ca.MX, u: ca.MX, d: ca.MX, p: ca.MX) -> ca.MX:
-    """The states behind those that sensors show: x - (y - x) where a state x is measured as y."""
-    distorted = model.h(seen, u, d, p)
-    rows = {name: k for k, name in enumerate(model.measured)}
-    return ca.vertcat(
-        ca.MX(0, 1),
-        *(
-            2.0 * seen[k] - distorted[rows[name]] if name in rows else seen[k]
-            for k, name in enumerate(model.states)
-        ),
-    )
 
 
 def window_firsts(recording: Recording, length: int) -> tuple[int, ...]:

@@ -14,10 +14,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-import casadi as ca
 import numpy as np
 
-from workbench.called import result
 from workbench.effect import Effect
 from workbench.fitting.error_model import OUTLYING, ErrorModel, error_model
 from workbench.fitting.window_cuts import (
@@ -27,16 +25,15 @@ from workbench.fitting.window_cuts import (
     received_windows,
     thinned,
     window_firsts,
-    window_run,
     window_starts,
 )
+from workbench.fitting.window_runs import WindowRuns
 from workbench.plant import Plant
 from workbench.recording import Recording
 
 WINDOW_S = 0.2
 MOST_WINDOWS = 1500  # five minutes: beyond, a fit learns little and takes long
 UNSEEN_PENALTY = 1e3  # residual in standard deviations of a sample that could not be simulated
-THREADS = 2
 SAME_CLOCK = 1e-4  # relative difference of sample times that counts as none
 
 
@@ -181,7 +178,7 @@ class Windows:
         u, d = (np.hstack([each[k] for each in fed]) for k in (0, 1))
         p = np.hstack([np.tile(plant.nominal[2][:, None], len(self)) for plant in plants])
         x0 = np.hstack(list(starts)) if starts.shape[1] else np.zeros((0, p.shape[1]))
-        y = result(self._runs(p.shape[1]), x0, u, d, p)
+        y = self._runs.outputs(x0, u, d, p, alike=len(self))
         n_y, n = len(self.plant.measured), len(self)
         sent = y.reshape(n_y, len(plants), n, self.length).transpose(1, 0, 2, 3)
         dt = self.recordings[0].sample_time_s
@@ -199,19 +196,9 @@ class Windows:
             weighted, nan=UNSEEN_PENALTY, posinf=UNSEEN_PENALTY, neginf=-UNSEEN_PENALTY
         )
 
-    def _runs(self, count: int) -> ca.Function:
-        """So many windows side by side; built once."""
-        if count not in self._built:
-            self._built[count] = self._run.map(count, "thread", THREADS)
-        return self._built[count]
-
     @cached_property
-    def _built(self) -> dict[int, ca.Function]:
-        return {}
-
-    @cached_property
-    def _run(self) -> ca.Function:
-        return window_run(self.plant, self.recordings[0].sample_time_s, self.length)
+    def _runs(self) -> WindowRuns:
+        return WindowRuns(self.plant.model, self.recordings[0].sample_time_s, self.length)
 
     def _inputs(self, plant: Plant) -> tuple[np.ndarray, np.ndarray]:
         """Commands and measured inputs of all windows side by side, (n_u, n L) and (n_d, n L)."""

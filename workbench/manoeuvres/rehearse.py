@@ -20,7 +20,7 @@ import numpy as np
 from workbench.called import called, result
 from workbench.effects.timing import sent_at_s
 from workbench.fitting.gauss_newton import Fit
-from workbench.fitting.windows import THREADS
+from workbench.fitting.window_runs import THREADS
 from workbench.manoeuvres.limits import Axis, Limits
 from workbench.manoeuvres.play import Play
 from workbench.model import BLOCK

@@ -1,0 +1,186 @@
+"""Runs in lockstep give what CasADi's own functions give, to the last bit, and are never needed."""
+
+import ctypes
+import logging
+from itertools import product
+
+import casadi as ca
+import numpy as np
+import pytest
+from conftest import drawn
+from test_compiled import cache, needs_compiler  # noqa: F401
+
+from workbench.fitting.windows import cut_windows
+from workbench.lanes import OPERATIONS, NoLanesError, lane_library, lanes_of
+from workbench.lockstep import lockstep
+from workbench.recording import Recording
+
+needs_lanes = pytest.mark.skipif(
+    lane_library("nothing", ["int nothing;"]) is None, reason="there is no compiler here"
+)
+DT, LENGTH = 1e-3, 12
+NUMBERS = [
+    -np.inf,
+    -3.5,
+    -1.0,
+    -0.5,
+    -1e-310,
+    -0.0,
+    0.0,
+    1e-310,
+    0.5,
+    1.0,
+    2.0,
+    1e9,
+    np.inf,
+    np.nan,
+]
+EACH = """
+int lanes(void) { return LANES; }
+void each(long long n, const double *in, double *out) {
+  for (long long k = 0; k < n; k += LANES) {
+    v a[1], b[1], c[SIZE];
+    for (int l = 0; l < LANES; l++) { a[0][l] = in[2 * (k + l)]; b[0][l] = in[2 * (k + l) + 1]; }
+    one(a, b, c);
+    for (int i = 0; i < SIZE; i++) 
+      for (int l = 0; l < LANES; l++) out[SIZE * (k + l) + i] = c[i][l];
+  }
+}
+"""
+
+
+def bits(values):
+    """What is to be equal: every number's own bits, of those that are none just that."""
+    return np.where(np.isnan(values), np.uint64(1), np.asarray(values).view(np.uint64))
+
+
+def every_operation():
+    """(a, b) -> all operations that have lanes."""
+    a, b = ca.SX.sym("a"), ca.SX.sym("b")
+    single = [ca.sqrt, ca.fabs, ca.exp, ca.log, ca.sin, ca.cos, ca.tan, ca.asin, ca.acos, ca.atan]
+    single += [ca.sinh, ca.cosh, ca.tanh, ca.floor, ca.ceil, ca.sign, ca.log1p, ca.expm1]
+    single += [lambda x: -x, lambda x: 1.0 / x, lambda x: x * x, lambda x: 2.0 * x, ca.logic_not]
+    single += [lambda x: x**2.5, lambda x: x + 0.1]
+    double = [ca.plus, ca.minus, ca.times, ca.rdivide, ca.power, ca.atan2, ca.hypot, ca.copysign]
+    double += [ca.fmin, ca.fmax, ca.lt, ca.le, ca.eq, ca.ne, ca.logic_and, ca.logic_or]
+    double += [lambda x, y: ca.if_else(x, y, 0.0), lambda x, y: ca.if_else(x < y, x, y)]
+    results = [f(a) for f in single] + [f(a, b) for f in double]
+    return ca.Function("every", [a, b], [ca.vertcat(*results)])
+
+
+@needs_lanes
+def test_every_operation_is_that_of_casadi_to_the_last_bit():
+    every = every_operation()
+    points = np.array([*product(NUMBERS, repeat=2)])
+    assert len(points) % 4 == 0
+    parts = [lanes_of(every, "one"), f"#define SIZE {every.numel_out(0)}", EACH]
+    library = lane_library("every", parts)
+    found = np.empty((len(points), every.numel_out(0)))
+    library.each(
+        ctypes.c_longlong(len(points)),
+        ctypes.c_void_p(points.ctypes.data),
+        ctypes.c_void_p(found.ctypes.data),
+    )
+
+    expected = np.array([every(*point).full().ravel() for point in points])
+
+    asked = {every.instruction_id(k) for k in range(every.n_instructions())}
+    assert asked >= set(OPERATIONS) - {ca.OP_ASSIGN}
+    np.testing.assert_array_equal(bits(found), bits(expected))
+
+
+def cut(plant, n=5):
+    """Windows over a recording of random commands, and random start states for each."""
+    found = drawn(plant, n * LENGTH, seed=5)
+    names = (*plant.model.commands, *plant.model.measured_inputs)
+    rows = dict(zip(names, np.vstack([found.u, found.d]), strict=True))
+    rows |= {name: np.zeros(n * LENGTH) for name in plant.measured}
+    noise = dict.fromkeys(plant.measured, 1.0)
+    windows = cut_windows(plant, [Recording("random", DT, rows)], noise, LENGTH * DT)
+    return windows, found.x[:, ::LENGTH]
+
+
+def with_something_missing(plant, most=5):
+    """The plant, and as it is with one of its candidates in a typical size."""
+    known = plant.parameters
+    strengths = [(c.strength, known[c.strength]) for c in plant.candidates.values()]
+    sizes = [{name: (k.null or 0.0) + 0.3 * k.typical} for name, k in strengths]
+    return [plant, *(plant.with_values(size) for size in sizes[:most])]
+
+
+@needs_lanes
+def test_every_plant_runs_in_lockstep_to_the_last_bit(plant, monkeypatch):
+    """Half a typical size off rest pistons strike their ends, and steps are refined."""
+    windows, starts = cut(plant)
+    several = with_something_missing(plant)
+    assert bool(plant.model.lockstep(DT)) == bool(plant.model.states)
+    together = windows.simulated(several, starts)
+
+    monkeypatch.setitem(plant.model._lockstep, DT, None)
+    one_by_one = windows.simulated(several, starts)
+
+    np.testing.assert_array_equal(bits(together), bits(one_by_one))
+
+
+@needs_lanes
+def test_which_runs_share_lanes_changes_nothing(drive):
+    at = drawn(drive, 6 * LENGTH)
+    given = at.x[:, ::LENGTH], at.u, at.d, np.tile(at.p[:, None], 6)
+    run = drive.model.lockstep(DT)
+
+    found = [run(*given, alike, threads) for alike, threads in ((6, 1), (1, 2), (3, 2))]
+
+    np.testing.assert_array_equal(bits(found[0]), bits(found[1]))
+    np.testing.assert_array_equal(bits(found[0]), bits(found[2]))
+
+
+@needs_lanes
+def test_a_run_that_is_lost_takes_no_other_with_it(drive):
+    found = drawn(drive, 4 * LENGTH)
+    x, p = found.x[:, ::LENGTH].copy(), np.tile(found.p[:, None], 4)
+    run = drive.model.lockstep(DT)
+    whole = run(x, found.u, found.d, p, 4, 2)
+    x[:, 1] = np.nan
+
+    after = run(x, found.u, found.d, p, 4, 2)
+
+    lost = np.repeat([False, True, False, False], LENGTH)
+    assert np.isnan(after[:, lost]).any() and np.isfinite(after[:, ~lost]).all()
+    np.testing.assert_array_equal(after[:, ~lost], whole[:, ~lost])
+
+
+@needs_lanes
+def test_shapes_that_do_not_fit_are_refused(drive):
+    found = drawn(drive, 2 * LENGTH)
+    with pytest.raises(ValueError, match="lockstep takes"):
+        drive.model.lockstep(DT)(found.x[:, :2], found.u, found.d, found.p[:, None], 2, 1)
+
+
+def test_an_operation_without_lanes_is_named():
+    x = ca.SX.sym("x")
+    with pytest.raises(NoLanesError, match=r"odd: CasADi's operation \d+ has no lanes"):
+        lanes_of(ca.Function("odd", [x], [ca.erf(x)]), "odd")
+
+
+def test_without_a_compiler_there_are_no_lanes(cache, monkeypatch, drive):  # noqa: F811
+    monkeypatch.setenv("WORKBENCH_NO_COMPILER", "1")
+
+    assert lockstep(drive.model, DT) is None
+
+
+@needs_compiler
+def test_what_does_not_compile_is_said_and_is_not_in_the_way(cache, caplog):  # noqa: F811
+    assert lane_library("broken", ["no C"]) is None
+    assert [r.levelno for r in caplog.records] == [logging.WARNING]
+    assert not list(cache.glob("*.so"))
+
+
+@needs_compiler
+def test_a_damaged_library_of_lanes_is_made_once_more(cache):  # noqa: F811
+    code = ["int seven(void) { return 7; }"]
+    lane_library("seven", code)
+    (path,) = cache.glob("*.so")
+    path.unlink()  # the old one is still open
+    path.write_bytes(b"no library")
+
+    assert lane_library("seven", code).seven() == 7

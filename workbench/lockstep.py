@@ -1,0 +1,119 @@
+"""Many runs of one model side by side, in lockstep on the lanes of the vector unit.
+
+A fit asks for a few hundred windows of a plant with a few dozen sets of values.  In lanes all of
+them take half to two thirds of the time, by how many steps are refined.  A step whose error does
+not pass is refined in the lanes that need it while the others wait, as deep as
+:mod:`workbench.rosenbrock` goes; so lanes of one window under different values go together, which
+meet an end or break away at the same time.  Every lane gives what
+:meth:`workbench.model.Model.run` gives, to the last bit.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import logging
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from workbench.lanes import NoLanesError, lane_library, lanes_of
+from workbench.rosenbrock import FINER, LEVELS, checked_step, steps_of
+
+if TYPE_CHECKING:
+    from workbench.model import Model
+
+log = logging.getLogger("workbench")
+
+GROUPS_AT_ONCE = 4  # groups of lanes that a thread takes before it asks for more
+
+DRIVER = Path(__file__).with_name("lockstep.c")
+
+
+@dataclass(frozen=True)
+class Lockstep:
+    """Outputs of a model over windows of equal length; made by :func:`lockstep`.
+
+    ``sizes`` are those of x, u, d, p and y.
+    """
+
+    sizes: tuple[int, int, int, int, int]
+    lanes: int
+    _run: Callable[..., None] = field(repr=False)
+
+    def __call__(
+        self,
+        x0: np.ndarray,
+        u: np.ndarray,
+        d: np.ndarray,
+        p: np.ndarray,
+        alike: int,
+        threads: int,
+    ) -> np.ndarray:
+        """Outputs (n_y, runs L) of x0 (n_x, runs), u and d (n, runs L), and p (n_p, runs).
+
+        The runs k, k + alike, k + 2 alike and so on share lanes.
+
+        Raises
+        ------
+        ValueError
+            If the shapes do not fit.
+        """
+        runs = x0.shape[1]
+        length = u.shape[1] // runs
+        shapes = zip(self.sizes, (runs, runs * length, runs * length, runs), strict=False)
+        for rows, shape in zip((x0, u, d, p), shapes, strict=True):
+            if rows.shape != shape:
+                raise ValueError(f"lockstep takes {shape}, given is {rows.shape}")
+        given = [np.ascontiguousarray(rows.T, dtype=float) for rows in (x0, u, d, p)]
+        y = np.empty((runs * length, self.sizes[-1]))
+        order = np.arange(runs).reshape(-1, alike).T.ravel().copy()
+        size = self.lanes * GROUPS_AT_ONCE
+        parts = [order[k : k + size] for k in range(0, runs, size)]
+
+        def run(part: np.ndarray) -> None:
+            self._run(len(part), _address(part), length, *map(_address, given), _address(y))
+
+        with ThreadPoolExecutor(threads) as several:
+            list(several.map(run, parts))
+        return y.T
+
+
+def lockstep(model: Model, sample_time_s: float) -> Lockstep | None:
+    """Runs of a model side by side; None where there is no compiler or an operation has no lanes.
+
+    Build it once: its C is written and looked for in the cache at every call.
+    """
+    steps = steps_of(sample_time_s)
+    sizes = (*(symbol.numel() for symbol in model.symbols), len(model.measured))
+    numbers = {
+        **dict(zip(("NX", "NU", "ND", "NP", "NY"), sizes, strict=True)),
+        "STEPS": steps,
+        "LEVELS": LEVELS,
+        "FINER": FINER,
+        "STEP_S": (sample_time_s / steps).hex(),
+    }
+    try:
+        parts = [
+            *(f"#define {name} {value}" for name, value in numbers.items()),
+            lanes_of(checked_step(model.symbols, model.rates, model.tolerances), "trial"),
+            lanes_of(model.h, "seen"),
+            DRIVER.read_text(encoding="utf-8"),
+        ]
+    except NoLanesError as error:
+        log.info("%s", error)
+        return None
+    found = lane_library("lockstep", parts)
+    if found is None:
+        return None
+    count, address = ctypes.c_longlong, ctypes.c_void_p
+    found.run.argtypes = [count, address, count, *[address] * 5]
+    found.run.restype = None
+    return Lockstep(sizes, found.lanes(), found.run)
+
+
+def _address(values: np.ndarray) -> ctypes.c_void_p:
+    return ctypes.c_void_p(values.ctypes.data)
