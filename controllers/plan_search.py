@@ -84,18 +84,12 @@ class PlanSearch:
     def costs(
         self, x: np.ndarray, query: np.ndarray, sent: tuple[int, int], asked: np.ndarray
     ) -> np.ndarray:
-        """Costs of plans by the nonlinear model, in samples, shape (n,).
-
-        A multiple of judged + 1 of them is what the compiled function takes; others are filled up.
-        """
-        missing = -len(asked) % (self.judged + 1)
-        filled = np.concatenate([asked, np.repeat(asked[-1:], missing, axis=0)])
-        shares = np.stack(self._shares(sent, filled.transpose(1, 0, 2)), axis=-1)
-        parts = shares.reshape(-1, (self.judged + 1) * self.horizon * 2)
-        by_model = np.concatenate([self._calls[2](x, part, query)[0] for part in parts])
+        """Costs of plans by the nonlinear model, in samples, shape (n,)."""
+        shares = np.stack(self._shares(sent, asked.transpose(1, 0, 2)), axis=-1)
+        by_model = self.prediction.judged.costs(x, shares, query)
         standing = np.broadcast_to(self.held(sent)[:, :1], (len(asked), 2, 1))
         switches = np.abs(np.diff(asked, axis=2, prepend=standing)).sum(axis=(1, 2))
-        costs = by_model[: len(asked)] + self.price * switches
+        costs = by_model + self.price * switches
         costs[~np.isfinite(costs)] = np.inf
         return costs
 
@@ -124,13 +118,13 @@ class PlanSearch:
         """The best pairs of plans under the modes along the last plan, shape (judged, 2, N)."""
         N, both = self.horizon, [self.plans(s) for s in sent]
         along = np.array(self._shares(sent, before))
-        way, columns = self._calls[0](x, along.T.ravel())
+        way, columns = self._linearised(x, along.T.ravel())
         by_share = columns.reshape(2 * N, 2 * N)  # a row for each share, as CasADi stores columns
         moves = [
-            ((response.ahead(s, p.packed) - along[v]) @ by_share[N * v : N * (v + 1)]).ravel()
+            (response.ahead(s, p.packed) - along[v]) @ by_share[N * v : N * (v + 1)]
             for v, (response, s, p) in enumerate(zip(self.responses, sent, both, strict=True))
         ]
-        (costs,) = self._calls[1](way, *moves, query, x)
+        costs = self.prediction.ranked.costs(way, moves, query, x)
         costs += self.price * np.add.outer(*(p.switches for p in both)).ravel()
         costs[~np.isfinite(costs)] = np.inf
         chosen = np.argpartition(costs, self.judged)[: self.judged]
@@ -152,14 +146,13 @@ class PlanSearch:
         return [response.ahead(s, packed(ahead)) for response, s, ahead in pairs]
 
     @cached_property
-    def _calls(self) -> tuple[Callable[..., list[np.ndarray]], ...]:
-        """The functions of the prediction, ready to be called at every sample."""
-        found = self.prediction
-        return tuple(prepared(f) for f in (found.linearised, found.ranked, found.judged))
+    def _linearised(self) -> Callable[..., list[np.ndarray]]:
+        """The function of the prediction, ready to be called at every sample."""
+        return prepared(self.prediction.linearised)
 
     def __getstate__(self) -> dict[str, object]:
         """Without what another process makes anew."""
-        return {key: value for key, value in self.__dict__.items() if key != "_calls"}
+        return {key: value for key, value in self.__dict__.items() if key != "_linearised"}
 
 
 def _distinct(asked: np.ndarray, order: np.ndarray) -> np.ndarray:

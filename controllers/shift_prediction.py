@@ -13,6 +13,8 @@ from itertools import product
 import casadi as ca
 import numpy as np
 
+from controllers.judging import Judging
+from controllers.ranking import Ranking
 from controllers.shift_cost import ShiftCost, beyond_weights, end_cost, stage_cost
 from linearize.shift_sample import half_stroke_m, one_sample, softened
 from linearize.shifting import POSITION
@@ -30,19 +32,19 @@ class ShiftPrediction:
     ``side`` is the sign of the way to the target.
 
     linearised    (x, shares (2, N)) -> positions and velocities (2 N,), their slopes (2 N, 2 N)
-    ranked        (way (2 N,), D1, D2 (2 N, n), query, x) -> cost of plan i and j at n i + j
-    judged        (x, shares (2, N k), query) -> cost (k,)
+    ranked        the costs of every pair of plans under these modes
+    judged        the costs of plans by the nonlinear model
     """
 
     linearised: ca.Function
-    ranked: ca.Function
-    judged: ca.Function
+    ranked: Ranking
+    judged: Judging
 
 
 def shift_prediction(
-    plant: Plant, cost: ShiftCost, sample_time_s: float, horizon: int, plans: int, kept: int
+    plant: Plant, cost: ShiftCost, sample_time_s: float, horizon: int, plans: int
 ) -> ShiftPrediction:
-    """The functions for ``horizon`` samples, ``plans`` of each valve, ``kept`` pairs to judge."""
+    """The functions for ``horizon`` samples, ``plans`` of each valve."""
     model, stroke_m = softened(plant), half_stroke_m(plant)
     stage, end = stage_cost(cost, stroke_m, sample_time_s), end_cost(cost, stroke_m, sample_time_s)
     weights = beyond_weights(cost, horizon)
@@ -50,8 +52,8 @@ def shift_prediction(
     free = one_sample(model, stroke_m, sample_time_s, stops=False)
     return ShiftPrediction(
         linearised=compiled(_linearised(free, horizon)),
-        ranked=compiled(_ranked(stage, end, weights, plans)),
-        judged=compiled(_judged(stopped, stage, end, weights, kept)),
+        ranked=_ranking(stage, end, weights, plans),
+        judged=_judging(stopped, stage, end, weights),
     )
 
 
@@ -110,7 +112,7 @@ def _linearised(step: ca.Function, horizon: int) -> ca.Function:
     return ca.Function("linearised", [start, shares], [places, steep])
 
 
-def _ranked(stage: ca.Function, end: ca.Function, weights: np.ndarray, plans: int) -> ca.Function:
+def _ranking(stage: ca.Function, end: ca.Function, weights: np.ndarray, plans: int) -> Ranking:
     horizon = len(weights)
     n = 2 * horizon
     begun, second = ca.SX.sym("begun", n), ca.SX.sym("second", n)
@@ -122,31 +124,19 @@ def _ranked(stage: ca.Function, end: ca.Function, weights: np.ndarray, plans: in
         total += paid
     total += end(far, at[n - 1], query)
     pair = ca.Function("pair", [begun, second, query, x], [ca.cse(total)])
-    # one map within the other: neither copies the plans of a valve for each of the other's
-    row = pair.map("row", "serial", plans, [0, 2, 3], [])
-    every = row.map("every", "serial", plans, [1, 2, 3], [])
-    sizes = ((n, 1), (n, plans), (n, plans), (3, 1), (4, 1))
-    way, first, *others = inputs = [ca.MX.sym(f"i{k}", *size) for k, size in enumerate(sizes)]
-    costs = every(ca.repmat(way, 1, plans) + first, *others)
-    return ca.Function("ranked", inputs, [costs.T])
+    return Ranking(pair, plans)
 
 
-def _judged(
-    step: ca.Function, stage: ca.Function, end: ca.Function, weights: np.ndarray, kept: int
-) -> ca.Function:
-    horizon, weight = len(weights), ca.SX.sym("weight")
+def _judging(
+    step: ca.Function, stage: ca.Function, end: ca.Function, weights: np.ndarray
+) -> Judging:
+    weight, total = ca.SX.sym("weight"), ca.SX.sym("total")
     x, share, query = ca.SX.sym("x", 4), ca.SX.sym("share", 2), ca.SX.sym("query", 3)
-    far, total = ca.SX.sym("far"), ca.SX.sym("total")
+    far = ca.SX.sym("far")
     later, met_m_s = step(x, share)
     paid, left = stage(far, later[2], met_m_s, query, weight)
     memory = ca.vertcat(x, far, total)
     result = ca.vertcat(later, left, total + paid)
-    one = ca.Function("one", [memory, share, query, weight], [result])
-    start, shares = ca.MX.sym("x", 4), ca.MX.sym("shares", 2, horizon)
-    asked = ca.MX.sym("query", 3)
-    begun = ca.vertcat(start, asked[1] * (asked[0] - start[2]), 0.0)
-    done = one.fold(horizon)(begun, shares, ca.repmat(asked, 1, horizon), ca.DM(weights).T)
-    plan = ca.Function("plan", [start, shares, asked], [done[5] + end(done[4], done[3], asked)])
-    many = plan.map("plans", "serial", kept, [0, 2], [])
-    inputs = [start, ca.MX.sym("all", 2, horizon * kept), asked]
-    return ca.Function("judged", inputs, [many(*inputs).T])
+    sample = ca.Function("sample", [memory, share, query, weight], [result])
+    last = ca.Function("last", [memory, query], [total + end(far, x[3], query)])
+    return Judging(sample, last, weights)

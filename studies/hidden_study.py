@@ -6,7 +6,8 @@ other widths.  Two processes answer; each answer is kept on disk at once, so a s
 on where a first one ended, and tells how many answers are of other code.  Visible is a hidden
 effect whose own refit removes more than 30 % of the misfit.
 
-``python -m studies.hidden_study --kind law --plant servo_drive`` answers a part of the full grid.
+``python -m studies.hidden_study --kind law --plant servo_drive`` answers a part of the full grid;
+``--alone`` takes the small differences away that every truth has beside what it hides.
 
 Source: diagnosis.md 5 (test bench).
 """
@@ -24,7 +25,7 @@ from studies.hidden_benches import BENCHES
 from studies.hidden_claims import outcome
 from studies.hidden_effects import Recorded
 from studies.hidden_rows import Kind, Row, plain, row_again
-from studies.hidden_tasks import SLOW, Task, recorded, tasks
+from studies.hidden_tasks import SLOW, Task, alone, recorded, tasks
 from studies.kept import Kept
 from studies.study import Extent, Outcome, Study
 from studies.versions import code_of_loops
@@ -96,6 +97,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--plant", nargs="+", choices=BENCHES)
     parser.add_argument("--only", nargs="+", metavar="NAME", help="what is hidden")
     parser.add_argument("--seeds", type=int, nargs="+")
+    parser.add_argument("--alone", action="store_true", help="no small differences beside it")
     parser.add_argument("--processes", type=int, default=PROCESSES)
     parser.add_argument("-o", "--output", type=Path, default=Path("studies_out/hidden-effects"))
     asked = parser.parse_args(arguments)
@@ -107,6 +109,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         and (asked.only is None or task.hidden in asked.only)
         and (asked.seeds is None or task.seed in asked.seeds)
     ]
+    part = [alone(task) for task in part] if asked.alone else part
     said = outcome(
         finished(asked.output, part, lambda line: print(line, flush=True), asked.processes)
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from studies.hidden_benches import BENCHES, SERVO_DRIVE, bench_of
 from studies.hidden_effects import Recorded, recordings
@@ -97,6 +97,11 @@ def _widths() -> Iterator[Task]:
     hidden = [c for c in stored if c.seed == WIDTH_SEED and c.hidden in truth.hidden]
     for case in hidden[::EVERY]:
         yield Task(Kind.WIDTH, (case,))
+
+
+def alone(task: Task) -> Task:
+    """The same question without the small differences that every truth has: what they do to it."""
+    return replace(task, cases=tuple(replace(case, differences=()) for case in task.cases))
 
 
 def recorded(asked: Sequence[Task]) -> list[Recorded]:

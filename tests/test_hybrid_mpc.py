@@ -123,12 +123,11 @@ def test_the_affine_modes_along_a_plan_cost_what_the_nonlinear_model_does(made):
         [r.ahead(0, packed(row)) for r, row in zip(made.search.responses, plan, strict=True)]
     )
     way, _ = called(made.search.prediction.linearised, VENTED, shares)
-    nothing = np.zeros((2 * horizon, count))
-    ranked = called(made.search.prediction.ranked, way, nothing, nothing, query, VENTED)[0]
-    many = np.tile(shares, (1, made.spec.judged + 1))
-    judged = called(made.search.prediction.judged, VENTED, many, query)[0]
+    nothing = np.zeros((count, 2 * horizon))
+    ranked = made.search.prediction.ranked.costs(way, [nothing] * 2, query, VENTED)
+    (judged,) = made.search.prediction.judged.costs(VENTED, shares.T[None], query)
 
-    assert ranked == pytest.approx(np.full(ranked.shape, judged[0, 0]), rel=1e-9)
+    assert ranked == pytest.approx(np.full(ranked.shape, judged), rel=1e-9)
 
 
 def test_the_slopes_along_a_plan_are_those_of_the_nonlinear_model(made):

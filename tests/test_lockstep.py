@@ -3,6 +3,8 @@
 import ctypes
 import logging
 from itertools import product
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import casadi as ca
 import numpy as np
@@ -11,13 +13,10 @@ from conftest import drawn
 from test_compiled import cache, needs_compiler  # noqa: F401
 
 from workbench.fitting.windows import cut_windows
-from workbench.lanes import OPERATIONS, NoLanesError, lane_library, lanes_of
+from workbench.lanes import OPERATIONS, NoLanesError, address, lane_library, lanes_of
 from workbench.lockstep import lockstep
 from workbench.recording import Recording
 
-needs_lanes = pytest.mark.skipif(
-    lane_library("nothing", ["int nothing;"]) is None, reason="there is no compiler here"
-)
 DT, LENGTH = 1e-3, 12
 NUMBERS = [
     -np.inf,
@@ -49,6 +48,21 @@ void each(long long n, const double *in, double *out) {
 """
 
 
+def driver(folder, code, name="driver"):
+    """A file with this C."""
+    path = folder / f"{name}.c"
+    path.write_text(code)
+    return path
+
+
+def has_lanes():
+    with TemporaryDirectory() as folder:
+        return lane_library(driver(Path(folder), "int nothing;"), {}, {}) is not None
+
+
+needs_lanes = pytest.mark.skipif(not has_lanes(), reason="there is no compiler here")
+
+
 def bits(values):
     """What is to be equal: every number's own bits, of those that are none just that."""
     return np.where(np.isnan(values), np.uint64(1), np.asarray(values).view(np.uint64))
@@ -69,18 +83,14 @@ def every_operation():
 
 
 @needs_lanes
-def test_every_operation_is_that_of_casadi_to_the_last_bit():
+def test_every_operation_is_that_of_casadi_to_the_last_bit(tmp_path):
     every = every_operation()
     points = np.array([*product(NUMBERS, repeat=2)])
     assert len(points) % 4 == 0
-    parts = [lanes_of(every, "one"), f"#define SIZE {every.numel_out(0)}", EACH]
-    library = lane_library("every", parts)
+    code = driver(tmp_path, EACH)
+    library = lane_library(code, {"SIZE": every.numel_out(0)}, {"one": every})
     found = np.empty((len(points), every.numel_out(0)))
-    library.each(
-        ctypes.c_longlong(len(points)),
-        ctypes.c_void_p(points.ctypes.data),
-        ctypes.c_void_p(found.ctypes.data),
-    )
+    library.each(ctypes.c_longlong(len(points)), address(points), address(found))
 
     expected = np.array([every(*point).full().ravel() for point in points])
 
@@ -158,8 +168,10 @@ def test_shapes_that_do_not_fit_are_refused(drive):
 
 def test_an_operation_without_lanes_is_named():
     x = ca.SX.sym("x")
+    odd = ca.Function("odd", [x], [ca.erf(x)])
     with pytest.raises(NoLanesError, match=r"odd: CasADi's operation \d+ has no lanes"):
-        lanes_of(ca.Function("odd", [x], [ca.erf(x)]), "odd")
+        lanes_of(odd, "odd")
+    assert lane_library(Path("not asked for"), {}, {"odd": odd}) is None
 
 
 def test_without_a_compiler_there_are_no_lanes(cache, monkeypatch, drive):  # noqa: F811
@@ -169,18 +181,18 @@ def test_without_a_compiler_there_are_no_lanes(cache, monkeypatch, drive):  # no
 
 
 @needs_compiler
-def test_what_does_not_compile_is_said_and_is_not_in_the_way(cache, caplog):  # noqa: F811
-    assert lane_library("broken", ["no C"]) is None
+def test_what_does_not_compile_is_said_and_is_not_in_the_way(cache, caplog, tmp_path):  # noqa: F811
+    assert lane_library(driver(tmp_path, "no C"), {}, {}) is None
     assert [r.levelno for r in caplog.records] == [logging.WARNING]
     assert not list(cache.glob("*.so"))
 
 
 @needs_compiler
-def test_a_damaged_library_of_lanes_is_made_once_more(cache):  # noqa: F811
-    code = ["int seven(void) { return 7; }"]
-    lane_library("seven", code)
+def test_a_damaged_library_of_lanes_is_made_once_more(cache, tmp_path):  # noqa: F811
+    code = driver(tmp_path, "int seven(void) { return 7; }")
+    lane_library(code, {}, {})
     (path,) = cache.glob("*.so")
     path.unlink()  # the old one is still open
     path.write_bytes(b"no library")
 
-    assert lane_library("seven", code).seven() == 7
+    assert lane_library(code, {}, {}).seven() == 7

@@ -13,7 +13,6 @@ from controllers.switching_plans import every_plan, moved
 from linearize.shifting import STATES
 from studies.gear_shift_study import _truth
 from studies.shift_check import check_shifts
-from workbench.called import called
 from workbench.plants.gearbox import gearbox
 
 HOLD, N = 4, 26
@@ -97,14 +96,14 @@ def test_a_pair_is_ranked_by_the_sum_of_both_ways(made):
     number = len(made.search.plans(0).switches)
     random = np.random.default_rng(3)
     way = np.concatenate([np.linspace(-11e-3, -2e-3, N), np.full(N, 0.4)])
-    first, second = 1e-3 * random.standard_normal((2, 2 * N, number))
-    nothing, x, asked = np.zeros((2 * N, number)), rest(-END_M), query(0.0, -END_M)
-    ranked = called(made.search.prediction.ranked, way, first, second, asked, x)[0].ravel()
+    first, second = 1e-3 * random.standard_normal((2, number, 2 * N))
+    nothing, x, asked = np.zeros((number, 2 * N)), rest(-END_M), query(0.0, -END_M)
+    ranking = made.search.prediction.ranked
+    ranked = ranking.costs(way, [first, second], asked, x)
     for i, j in ((0, 0), (3, 8), (8, 3)):
-        moved_way = way + first[:, i] + second[:, j]
-        alone = called(made.search.prediction.ranked, moved_way, nothing, nothing, asked, x)[0]
+        alone = ranking.costs(way + first[i] + second[j], [nothing] * 2, asked, x)
 
-        assert ranked[number * i + j] == pytest.approx(alone.ravel()[0], rel=1e-9)
+        assert ranked[number * i + j] == pytest.approx(alone[0], rel=1e-9)
 
 
 @pytest.mark.parametrize(("at_stop", "too_slow"), [(1.0, True), (0.0, False)])

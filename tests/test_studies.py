@@ -14,7 +14,7 @@ from studies.hidden_answers import counted, widened
 from studies.hidden_benches import BENCHES, SERVO_DRIVE
 from studies.hidden_claims import outcome
 from studies.hidden_rows import Kind, Row, plain, row_again
-from studies.hidden_tasks import tasks
+from studies.hidden_tasks import alone, tasks
 from studies.kept import Kept
 from studies.registry import STUDIES
 from studies.running import ALL, run_study
@@ -47,6 +47,15 @@ def test_answers_of_other_code_are_told(tmp_path):
 
     assert hidden_study.which_code(tmp_path, several).startswith("2 of 3 answers are of other code")
     assert "; " not in hidden_study.which_code(tmp_path, several[1:2])
+
+
+def test_a_question_without_the_small_differences_is_another_one_of_the_same_size():
+    task = next(t for t in tasks(Extent.FULL) if t.hidden == "coulomb_friction")
+    (plain_case,) = alone(task).cases
+
+    assert task.cases[0].differences and not plain_case.differences
+    assert (plain_case.size, plain_case.hidden) == (task.cases[0].size, task.hidden)
+    assert alone(task).key != task.key
 
 
 def test_a_study_of_right_answers_holds_its_claims():

@@ -12,12 +12,16 @@ Written for the machine it runs on: the library is kept under what the compiler 
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Sequence
+import logging
+from collections.abc import Mapping
 from pathlib import Path
 
 import casadi as ca
+import numpy as np
 
 from workbench.compiled import loaded
+
+log = logging.getLogger("workbench")
 
 FLAGS = ("-march=native", "-fno-math-errno")  # the latter lets a root be one instruction
 
@@ -100,6 +104,24 @@ def _number(value: float) -> str:
     return value.hex()
 
 
-def lane_library(name: str, parts: Sequence[str]) -> ctypes.CDLL | None:
-    """The library of these parts of C behind ``lanes.h``; None where it cannot be had."""
-    return loaded(name, "\n".join([HEAD.read_text(encoding="utf-8"), *parts]), FLAGS)
+def lane_library(
+    driver: Path, sizes: Mapping[str, object], functions: Mapping[str, ca.Function]
+) -> ctypes.CDLL | None:
+    """The library of a driver in C, which calls these functions in lanes by these names.
+
+    ``sizes`` are defined for it.  None where there is no compiler, or none that knows the machine
+    it runs on, or where a function has no lanes: then all runs as CasADi has it.
+    """
+    try:
+        written = [lanes_of(function, name) for name, function in functions.items()]
+    except NoLanesError as error:
+        log.info("%s", error)
+        return None
+    defined = [f"#define {name} {value}" for name, value in sizes.items()]
+    head, rest = (path.read_text(encoding="utf-8") for path in (HEAD, driver))
+    return loaded(driver.stem, "\n".join([head, *defined, *written, rest]), FLAGS)
+
+
+def address(values: np.ndarray) -> ctypes.c_void_p:
+    """Where an array begins that C is to read or fill: contiguous, and kept alive meanwhile."""
+    return ctypes.c_void_p(values.ctypes.data)

@@ -11,7 +11,6 @@ meet an end or break away at the same time.  Every lane gives what
 from __future__ import annotations
 
 import ctypes
-import logging
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -20,13 +19,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from workbench.lanes import NoLanesError, lane_library, lanes_of
+from workbench.lanes import address, lane_library
 from workbench.rosenbrock import FINER, LEVELS, checked_step, steps_of
 
 if TYPE_CHECKING:
     from workbench.model import Model
-
-log = logging.getLogger("workbench")
 
 GROUPS_AT_ONCE = 4  # groups of lanes that a thread takes before it asks for more
 
@@ -75,7 +72,7 @@ class Lockstep:
         parts = [order[k : k + size] for k in range(0, runs, size)]
 
         def run(part: np.ndarray) -> None:
-            self._run(len(part), _address(part), length, *map(_address, given), _address(y))
+            self._run(len(part), address(part), length, *map(address, given), address(y))
 
         with ThreadPoolExecutor(threads) as several:
             list(several.map(run, parts))
@@ -96,24 +93,11 @@ def lockstep(model: Model, sample_time_s: float) -> Lockstep | None:
         "FINER": FINER,
         "STEP_S": (sample_time_s / steps).hex(),
     }
-    try:
-        parts = [
-            *(f"#define {name} {value}" for name, value in numbers.items()),
-            lanes_of(checked_step(model.symbols, model.rates, model.tolerances), "trial"),
-            lanes_of(model.h, "seen"),
-            DRIVER.read_text(encoding="utf-8"),
-        ]
-    except NoLanesError as error:
-        log.info("%s", error)
-        return None
-    found = lane_library("lockstep", parts)
+    trial = checked_step(model.symbols, model.rates, model.tolerances)
+    found = lane_library(DRIVER, numbers, {"trial": trial, "seen": model.h})
     if found is None:
         return None
-    count, address = ctypes.c_longlong, ctypes.c_void_p
-    found.run.argtypes = [count, address, count, *[address] * 5]
+    count, place = ctypes.c_longlong, ctypes.c_void_p
+    found.run.argtypes = [count, place, count, *[place] * 5]
     found.run.restype = None
     return Lockstep(sizes, found.lanes(), found.run)
-
-
-def _address(values: np.ndarray) -> ctypes.c_void_p:
-    return ctypes.c_void_p(values.ctypes.data)
