@@ -25,7 +25,8 @@ def cache(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.delenv("WORKBENCH_NO_COMPILER", raising=False)
-    remembered = (module._compiler, module._version, module._folder)
+    remembered = (module._compiler, module._version, module._folder, module._machine)
+    monkeypatch.setattr(module, "_refused", set())
     for function in remembered:
         function.cache_clear()
     yield tmp_path / "workbench" / "compiled"

@@ -2,16 +2,21 @@
 
 import ctypes
 import logging
+import os
+import pickle
+import shutil
+from copy import deepcopy
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import casadi as ca
 import numpy as np
 import pytest
 from conftest import drawn
-from test_compiled import cache, needs_compiler  # noqa: F401
+from test_compiled import HAS_COMPILER, cache, needs_compiler  # noqa: F401
 
+from workbench.compiled import COMPILERS
 from workbench.fitting.windows import cut_windows
 from workbench.lanes import OPERATIONS, NoLanesError, address, lane_library, lanes_of
 from workbench.lockstep import lockstep
@@ -55,12 +60,10 @@ def driver(folder, code, name="driver"):
     return path
 
 
-def has_lanes():
-    with TemporaryDirectory() as folder:
-        return lane_library(driver(Path(folder), "int nothing;"), {}, {}) is not None
-
-
-needs_lanes = pytest.mark.skipif(not has_lanes(), reason="there is no compiler here")
+needs_lanes = pytest.mark.skipif(
+    not HAS_COMPILER or os.environ.get("WORKBENCH_NO_COMPILER", "") not in ("", "0"),
+    reason="there is no compiler here",
+)
 
 
 def bits(values):
@@ -99,14 +102,14 @@ def test_every_operation_is_that_of_casadi_to_the_last_bit(tmp_path):
     np.testing.assert_array_equal(bits(found), bits(expected))
 
 
-def cut(plant, n=5):
+def cut(plant, dt, n=5):
     """Windows over a recording of random commands, and random start states for each."""
     found = drawn(plant, n * LENGTH, seed=5)
     names = (*plant.model.commands, *plant.model.measured_inputs)
     rows = dict(zip(names, np.vstack([found.u, found.d]), strict=True))
     rows |= {name: np.zeros(n * LENGTH) for name in plant.measured}
     noise = dict.fromkeys(plant.measured, 1.0)
-    windows = cut_windows(plant, [Recording("random", DT, rows)], noise, LENGTH * DT)
+    windows = cut_windows(plant, [Recording("random", dt, rows)], noise, LENGTH * dt)
     return windows, found.x[:, ::LENGTH]
 
 
@@ -119,17 +122,43 @@ def with_something_missing(plant, most=5):
 
 
 @needs_lanes
-def test_every_plant_runs_in_lockstep_to_the_last_bit(plant, monkeypatch):
-    """Half a typical size off rest pistons strike their ends, and steps are refined."""
-    windows, starts = cut(plant)
+@pytest.mark.parametrize("dt", [DT, 2.5e-3])
+def test_every_plant_runs_in_lockstep_to_the_last_bit(plant, dt, monkeypatch):
+    """Half a typical size off rest pistons strike their ends, and steps are refined.
+
+    A sample of 2.5 ms takes three steps.
+    """
+    windows, starts = cut(plant, dt)
     several = with_something_missing(plant)
-    assert bool(plant.model.lockstep(DT)) == bool(plant.model.states)
+    assert bool(plant.model.lockstep(dt)) == bool(plant.model.states)
     together = windows.simulated(several, starts)
 
-    monkeypatch.setitem(plant.model._lockstep, DT, None)
-    one_by_one = windows.simulated(several, starts)
+    monkeypatch.setitem(plant.model._lockstep, dt, None)
+    by_casadi = windows.simulated(several, starts)
 
-    np.testing.assert_array_equal(bits(together), bits(one_by_one))
+    np.testing.assert_array_equal(bits(together), bits(by_casadi))
+
+
+@needs_lanes
+def test_what_has_run_travels_and_is_copied(drive):
+    windows, starts = cut(drive, DT)
+    expected = windows.simulated([drive], starts)
+
+    for again in (pickle.loads(pickle.dumps(windows)), deepcopy(windows)):
+        np.testing.assert_array_equal(again.simulated([again.plant], starts), expected)
+
+
+@needs_lanes
+def test_an_output_that_is_always_zero_keeps_its_row(drive):
+    found, zero = drawn(drive, 4 * LENGTH), ca.SX(1, 1)
+    model = replace(drive.model, outputs=ca.vertcat(zero, drive.model.outputs))
+    model = replace(model, measured=("none", *model.measured), _lockstep={})
+    given = found.x[:, ::LENGTH], found.u, found.d, np.tile(found.p[:, None], 4), 4, 1
+
+    rows = model.lockstep(DT)(*given)
+
+    assert not rows[0].any()
+    np.testing.assert_array_equal(rows[1:], drive.model.lockstep(DT)(*given))
 
 
 @needs_lanes
@@ -161,9 +190,14 @@ def test_a_run_that_is_lost_takes_no_other_with_it(drive):
 
 @needs_lanes
 def test_shapes_that_do_not_fit_are_refused(drive):
-    found = drawn(drive, 2 * LENGTH)
+    found, run = drawn(drive, 2 * LENGTH), drive.model.lockstep(DT)
+    x, p = found.x[:, ::LENGTH], np.tile(found.p[:, None], 2)
     with pytest.raises(ValueError, match="lockstep takes"):
-        drive.model.lockstep(DT)(found.x[:, :2], found.u, found.d, found.p[:, None], 2, 1)
+        run(x, found.u, found.d, p[:, :1], 2, 1)
+    with pytest.raises(ValueError, match="runs by 3, given are 2"):
+        run(x, found.u, found.d, p, 3, 1)
+    with pytest.raises(ValueError, match="given are 0"):
+        run(x[:, :0], found.u[:, :0], found.d[:, :0], p[:, :0], 1, 1)
 
 
 def test_an_operation_without_lanes_is_named():
@@ -183,8 +217,31 @@ def test_without_a_compiler_there_are_no_lanes(cache, monkeypatch, drive):  # no
 @needs_compiler
 def test_what_does_not_compile_is_said_and_is_not_in_the_way(cache, caplog, tmp_path):  # noqa: F811
     assert lane_library(driver(tmp_path, "no C"), {}, {}) is None
+    assert lane_library(driver(tmp_path, "no C, still"), {}, {}) is None
     assert [r.levelno for r in caplog.records] == [logging.WARNING]
     assert not list(cache.glob("*.so"))
+
+
+@pytest.mark.skipif(not any(map(shutil.which, COMPILERS)), reason="no compiler on the path")
+def test_a_compiler_that_does_not_know_its_own_machine_makes_lanes_too(
+    cache,  # noqa: F811
+    monkeypatch,
+    tmp_path,
+    caplog,
+):
+    """As Apple's of some years ago."""
+    found = next(filter(shutil.which, COMPILERS))
+    script = tmp_path / "older"
+    script.write_text(
+        '#!/bin/sh\ncase "$*" in *native*) echo no such machine >&2; exit 1;; esac\n'
+        f'exec {found} "$@"\n'
+    )
+    script.chmod(0o755)
+    monkeypatch.setenv("CC", str(script))
+
+    code = driver(tmp_path, "int seven(void) { return 7; }")
+    assert lane_library(code, {}, {}).seven() == 7
+    assert not caplog.records
 
 
 @needs_compiler

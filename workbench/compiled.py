@@ -42,6 +42,8 @@ COMPILERS = ("cc", "gcc", "clang")
 PACKAGED = (sys.executable, "-m", "ziglang", "cc")
 TIMEOUT_S = 120.0
 
+_refused: set[tuple[tuple[str, ...], str]] = set()  # compilers, and what they do not compile
+
 
 def compiled(function: ca.Function) -> ca.Function:
     """The same function as machine code, equal to the last bit; itself where that cannot be had."""
@@ -69,18 +71,24 @@ def _compiler(wanted: str, forbidden: str) -> tuple[str, ...]:
     return ()
 
 
-def loaded(name: str, code: str, flags: tuple[str, ...]) -> ctypes.CDLL | None:
+def loaded(
+    name: str, code: str, native: tuple[tuple[str, ...], ...], flags: tuple[str, ...]
+) -> ctypes.CDLL | None:
     """A library of C written elsewhere, for the machine that this runs on.
 
-    None where there is no compiler, or none that compiles it; the latter is said.
+    ``native`` are ways to say so, of which the first is taken that the compiler knows.  None where
+    there is no compiler, or none that compiles it; the latter is said once, and not tried again.
+    The library stays open as long as the process lives.
     """
     compiler = _compiler(os.environ.get("CC", ""), os.environ.get("WORKBENCH_NO_COMPILER", ""))
-    if not compiler:
+    if not compiler or (compiler, name) in _refused:
         return None
     try:
-        command = (*compiler, "-O2", *FLAGS, *flags)
-        return _opened(lambda: _made(name, code, command, _machine(compiler, flags)), ctypes.CDLL)
+        machine, told = _machine(compiler, native)
+        command = (*compiler, "-O2", *FLAGS, *machine, *flags)
+        return _opened(lambda: _made(name, code, command, told), ctypes.CDLL)
     except (OSError, subprocess.SubprocessError) as error:
+        _refused.add((compiler, name))
         _say_not_compiled(name, error)
         return None
 
@@ -153,11 +161,21 @@ def _version(compiler: tuple[str, ...]) -> str:
 
 
 @cache
-def _machine(compiler: tuple[str, ...], flags: tuple[str, ...]) -> str:
-    """What a compiler takes the machine for under these flags: all that it defines."""
-    answer = _run([*compiler, *flags, "-dM", "-E", "-x", "c", os.devnull])
-    answer.check_returncode()
-    return answer.stdout
+def _machine(
+    compiler: tuple[str, ...], native: tuple[tuple[str, ...], ...]
+) -> tuple[tuple[str, ...], str]:
+    """Flags that a compiler knows, and what it takes the machine for under them: all it defines.
+
+    Raises
+    ------
+    OSError
+        If it knows none of them.
+    """
+    for flags in native:
+        answer = _run([*compiler, *flags, "-dM", "-E", "-x", "c", os.devnull])
+        if not answer.returncode:
+            return flags, _version(compiler) + answer.stdout
+    raise OSError(f"{compiler[0]} does not say what machine it compiles for")
 
 
 def _run(command: list[str]) -> subprocess.CompletedProcess[str]:

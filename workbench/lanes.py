@@ -2,9 +2,10 @@
 
 A processor divides four numbers in the time it needs for one or two.  CasADi writes C for one
 point; here the same instructions are written on vectors of LANES numbers (GCC's and Clang's vector
-types), so that what is run side by side goes in lockstep.  Each lane gives what CasADi's own C
-gives, to the last bit: no sum is reordered, no product contracted, and what the vector unit lacks
-(exp, log, powers, sines) is asked lane by lane from the same library.
+types), so that what is run side by side goes in lockstep.  Each lane gives what CasADi gives, to
+the last bit: no sum is reordered, no product contracted, and what the vector unit lacks (exp, log,
+powers, sines) is asked lane by lane from the same library.  Of the smaller or larger of +0 and -0,
+whose sign C leaves open, lanes take what CasADi's virtual machine takes.
 
 Written for the machine it runs on: the library is kept under what the compiler says of that.
 """
@@ -23,7 +24,8 @@ from workbench.compiled import loaded
 
 log = logging.getLogger("workbench")
 
-FLAGS = ("-march=native", "-fno-math-errno")  # the latter lets a root be one instruction
+NATIVE = (("-march=native",), ("-mcpu=native",), ())  # as compilers of some processors want it
+FLAGS = ("-fno-math-errno",)  # lets a root be one instruction
 
 HEAD = Path(__file__).with_name("lanes.h")
 
@@ -65,14 +67,14 @@ class NoLanesError(ValueError):
 def lanes_of(function: ca.Function, name: str) -> str:
     """C of ``void name(const v *i0, ..., v *o0, ...)``: every entry of in- and outputs is a vector.
 
-    Entries are those that CasADi stores, column by column.
+    Entries are all of each, column by column, also those that CasADi knows to be zero.
 
     Raises
     ------
     NoLanesError
         If an operation of the function is not written on vectors.
     """
-    lines, used = [], set()
+    lines, used, function = [], set(), _dense(function)
     for k in range(function.n_instructions()):
         operation = function.instruction_id(k)
         given, to = function.instruction_input(k), function.instruction_output(k)
@@ -93,6 +95,14 @@ def lanes_of(function: ca.Function, name: str) -> str:
     arguments += [f"v *restrict o{k}" for k in range(function.n_out())]
     work = f"v {', '.join(f'w{k}' for k in sorted(used))};" if used else ""
     return "\n".join([f"static void {name}({', '.join(arguments)}) {{", work, *lines, "}", ""])
+
+
+def _dense(function: ca.Function) -> ca.Function:
+    """The same with every entry stored."""
+    names = [f"i{k}" for k in range(function.n_in())]
+    given = [ca.SX.sym(n, *function.size_in(k)) for k, n in enumerate(names)]
+    results = [ca.densify(result) for result in function.call(given)]
+    return ca.Function(function.name(), given, results)
 
 
 def _number(value: float) -> str:
@@ -119,7 +129,7 @@ def lane_library(
         return None
     defined = [f"#define {name} {value}" for name, value in sizes.items()]
     head, rest = (path.read_text(encoding="utf-8") for path in (HEAD, driver))
-    return loaded(driver.stem, "\n".join([head, *defined, *written, rest]), FLAGS)
+    return loaded(driver.stem, "\n".join([head, *defined, *written, rest]), NATIVE, FLAGS)
 
 
 def address(values: np.ndarray) -> ctypes.c_void_p:

@@ -5,7 +5,8 @@ them take half to two thirds of the time, by how many steps are refined.  A step
 not pass is refined in the lanes that need it while the others wait, as deep as
 :mod:`workbench.rosenbrock` goes; so lanes of one window under different values go together, which
 meet an end or break away at the same time.  Every lane gives what
-:meth:`workbench.model.Model.run` gives, to the last bit.
+:meth:`workbench.model.Model.run` gives, to the last bit.  A run that is lost, whose every step is
+refined to the end, holds up the others of its lanes.
 """
 
 from __future__ import annotations
@@ -37,9 +38,13 @@ class Lockstep:
     ``sizes`` are those of x, u, d, p and y.
     """
 
-    sizes: tuple[int, int, int, int, int]
+    sizes: tuple[int, ...]
     lanes: int
     _run: Callable[..., None] = field(repr=False)
+
+    def __deepcopy__(self, memo: object) -> Lockstep:
+        """Itself: it never changes, and its library has one address."""
+        return self
 
     def __call__(
         self,
@@ -52,14 +57,16 @@ class Lockstep:
     ) -> np.ndarray:
         """Outputs (n_y, runs L) of x0 (n_x, runs), u and d (n, runs L), and p (n_p, runs).
 
-        The runs k, k + alike, k + 2 alike and so on share lanes.
+        The runs k, k + alike, k + 2 alike and so on, which meet the same, lie next to each other.
 
         Raises
         ------
         ValueError
-            If the shapes do not fit.
+            If the shapes do not fit, there are no runs, or ``alike`` does not divide their number.
         """
         runs = x0.shape[1]
+        if not runs or runs % alike:
+            raise ValueError(f"lockstep takes runs by {alike}, given are {runs}")
         length = u.shape[1] // runs
         shapes = zip(self.sizes, (runs, runs * length, runs * length, runs), strict=False)
         for rows, shape in zip((x0, u, d, p), shapes, strict=True):
@@ -68,12 +75,16 @@ class Lockstep:
         given = [np.ascontiguousarray(rows.T, dtype=float) for rows in (x0, u, d, p)]
         y = np.empty((runs * length, self.sizes[-1]))
         order = np.arange(runs).reshape(-1, alike).T.ravel().copy()
-        size = self.lanes * GROUPS_AT_ONCE
+        groups = -(-runs // self.lanes)
+        size = self.lanes * max(min(GROUPS_AT_ONCE, groups // (2 * threads)), 1)
         parts = [order[k : k + size] for k in range(0, runs, size)]
 
         def run(part: np.ndarray) -> None:
             self._run(len(part), address(part), length, *map(address, given), address(y))
 
+        if len(parts) == 1:
+            run(parts[0])
+            return y.T
         with ThreadPoolExecutor(threads) as several:
             list(several.map(run, parts))
         return y.T

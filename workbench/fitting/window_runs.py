@@ -16,7 +16,10 @@ THREADS = 2
 
 @dataclass(frozen=True)
 class WindowRuns:
-    """Runs of a model over windows of ``length`` samples: in lanes, or one by one without any."""
+    """Runs of a model over windows of ``length`` samples: in lanes, or by CasADi without any.
+
+    Both use two threads and give the same to the last bit.
+    """
 
     model: Model
     sample_time_s: float
@@ -28,16 +31,16 @@ class WindowRuns:
         """Outputs (n_y, runs L) of starts (n_x, runs), inputs (n, runs L) and values (n_p, runs).
 
         ``x0`` is the start as the sensors show it.  The runs k, k + alike and so on are those of
-        one window: where they go in lanes they share them.
+        one window, which go in lanes best side by side.
         """
         together, runs = self.model.lockstep(self.sample_time_s), x0.shape[1]
         if together is None:
-            return result(self._one_by_one(runs), x0, u, d, p)
+            return result(self._by_casadi(runs), x0, u, d, p)
         first = slice(None, None, self.length)
         begun = result(self._begin.map(runs), x0, u[:, first], d[:, first], p)
         return together(begun, u, d, p, alike, THREADS)
 
-    def _one_by_one(self, runs: int) -> ca.Function:
+    def _by_casadi(self, runs: int) -> ca.Function:
         """So many runs; built once."""
         if runs not in self._built:
             self._built[runs] = self._run.map(runs, "thread", THREADS)

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -199,6 +200,10 @@ class Windows:
     @cached_property
     def _runs(self) -> WindowRuns:
         return WindowRuns(self.plant.model, self.recordings[0].sample_time_s, self.length)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but what runs them, which is built again: a model does not travel."""
+        return {key: value for key, value in self.__dict__.items() if key != "_runs"}
 
     def _inputs(self, plant: Plant) -> tuple[np.ndarray, np.ndarray]:
         """Commands and measured inputs of all windows side by side, (n_u, n L) and (n_d, n L)."""
