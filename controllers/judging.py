@@ -39,6 +39,11 @@ class Judging:
     last: ca.Function
     weights: np.ndarray
 
+    def __post_init__(self) -> None:
+        """Built with the design: compiling takes seconds that no sample has."""
+        if self._lanes is None:
+            _ = self._several
+
     def costs(self, x: np.ndarray, shares: np.ndarray, query: np.ndarray) -> np.ndarray:
         """Costs in samples, shape (n,), of shares (n, N, 2) from a state (4,)."""
         given = [np.ascontiguousarray(each, dtype=float) for each in (x, shares, query)]
@@ -79,6 +84,10 @@ class Judging:
             library.judge.argtypes = [ctypes.c_longlong, *[ctypes.c_void_p] * 5]
             library.judge.restype = None
         return library
+
+    def __setstate__(self, state: dict[str, object]) -> None:
+        self.__dict__.update(state)
+        self.__post_init__()
 
     def __getstate__(self) -> dict[str, object]:
         """Without what another process makes anew."""

@@ -32,6 +32,11 @@ class Ranking:
     pair: ca.Function
     plans: int
 
+    def __post_init__(self) -> None:
+        """Built with the design: compiling takes seconds that no sample has."""
+        if self._lanes is None:
+            _ = self._by_casadi
+
     def costs(
         self, way: np.ndarray, moves: list[np.ndarray], query: np.ndarray, x: np.ndarray
     ) -> np.ndarray:
@@ -66,6 +71,10 @@ class Ranking:
             library.rank.argtypes = [ctypes.c_void_p] * 6
             library.rank.restype = None
         return library
+
+    def __setstate__(self, state: dict[str, object]) -> None:
+        self.__dict__.update(state)
+        self.__post_init__()
 
     def __getstate__(self) -> dict[str, object]:
         """Without what another process makes anew."""
