@@ -56,7 +56,7 @@ class HybridMpcSpec:
         Samples ahead: a shift is braked in about 15 ms.
     hold_s
         Least time between two switches of a valve.
-    within_m, beyond_m, beyond_weight, beyond_later, landing_m_s, neutral_m_s, arriving_m_s
+    within_m, beyond_m, beyond_weight, beyond_later, bounced, landing_m_s, neutral_m_s, arriving_m_s
         See :class:`controllers.shift_cost.ShiftCost`.
     landing_s, end_s, brake_m_s2, brake_after_s
         See there.
@@ -74,6 +74,7 @@ class HybridMpcSpec:
     beyond_m: float = 2e-4
     beyond_weight: float = 240.0
     beyond_later: float = ranged(0.2, most=1.0)
+    bounced: float = ranged(0.1, most=1.0)
     landing_m_s: float = 0.6
     neutral_m_s: float = 0.35
     arriving_m_s: float = 0.3

@@ -5,12 +5,14 @@
     fast = max(v_N - v_safe, 0),  v_safe = v_land - a t + sqrt((a t)^2 + 2 a far_N)
 
 d grows with the distance that is left of a shift and is 1 for the way from Neutral to an end, and
-``over`` is what is gone past Neutral; the second sum is over the samples at which the target is
-reached, and v_safe the speed that a brake with deceleration a after a delay t still takes away.
+``over`` is what is gone past Neutral, or bounced off an end; the second sum is over the samples at
+which the target is reached, and v_safe the speed that a brake with deceleration a after a delay t
+still takes away.
 
 An end that is to be met with less than v_arr is easily missed: a piston whose friction is a little
 larger stands short of it until the pressure has built up again.  At Neutral v_arr is 0, and an end
-is met once, however often the piston bounces.
+is met once, however often the piston bounces.  A bounce of more than 0.3 mm is a shift that has not
+ended; the pressure that has braked the piston pushes it off.
 """
 
 from __future__ import annotations
@@ -33,6 +35,7 @@ class ShiftCost:
     within_m            distance from the target that costs nothing
     beyond_m            tolerated past Neutral
     beyond_weight       w_1, of what is gone further; ``beyond_later`` the share w_N of it
+    bounced             share of that for what the piston bounces off its end further than beyond_m
     landing_m_s         v_land at an end; ``neutral_m_s`` at Neutral
     arriving_m_s        v_arr, with which an end is to be met at least
     landing_s           T_land, s per (m/s)^2
@@ -45,6 +48,7 @@ class ShiftCost:
     beyond_m: float
     beyond_weight: float
     beyond_later: float
+    bounced: float
     landing_m_s: float
     neutral_m_s: float
     arriving_m_s: float
@@ -65,7 +69,9 @@ def stage_cost(cost: ShiftCost, stroke_m: float, dt: float) -> ca.Function:
     target, side, at_stop = ca.vertsplit(query)
     far = side * (target - at)
     distance = _distance(cost, stroke_m, far, at_stop)
-    beyond = (1.0 - at_stop) * ca.fmax(-far - cost.beyond_m, 0.0) / stroke_m
+    back_m = (before <= HIT) * far  # of a piston that has met its end
+    gone_m, share = ca.if_else(at_stop, back_m, -far), ca.if_else(at_stop, cost.bounced, 1.0)
+    beyond = share * ca.fmax(gone_m - cost.beyond_m, 0.0) / stroke_m
     reached = ca.logic_and(before > HIT, far <= HIT)
     returned = ca.logic_and(ca.logic_and(before < -HIT, far >= -HIT), 1.0 - at_stop)
     gentle_m_s = ca.if_else(at_stop, cost.landing_m_s, cost.neutral_m_s)

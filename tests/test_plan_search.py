@@ -121,6 +121,18 @@ def test_an_end_is_to_be_met_neither_hard_nor_faintly(at_stop, too_slow):
     assert (paid(0.05) > 1.0) == too_slow
 
 
+def test_a_bounce_off_an_end_costs_more_than_the_way_to_it():
+    """Once the end was met; what lies within the tolerance costs no more."""
+    spec = HybridMpcSpec()
+    stage, asked = stage_cost(spec.cost, END_M, 1e-3), np.array([END_M, 1.0, 1.0])
+
+    def paid(before_m, far_m):
+        return float(stage(before_m, END_M - far_m, 0.0, asked, spec.beyond_weight)[0])
+
+    assert paid(0.0, 0.5e-3) > 2.0 * paid(1e-3, 0.5e-3) > 0.0
+    assert paid(0.0, 0.15e-3) == pytest.approx(paid(1e-3, 0.15e-3))
+
+
 def test_an_end_is_met_once_however_the_piston_bounces():
     stage = stage_cost(HybridMpcSpec().cost, END_M, 1e-3)
     asked = np.array([END_M, 1.0, 1.0])
