@@ -15,6 +15,7 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 
+from controllers.with_lanes import WithLanes
 from workbench.called import prepared
 from workbench.compiled import compiled
 from workbench.lanes import address, lane_library
@@ -24,7 +25,7 @@ AT_ONCE = 8  # plans of one call without lanes
 
 
 @dataclass(frozen=True)
-class Judging:
+class Judging(WithLanes):
     """Costs of plans over N samples.
 
     A memory is (state (4,), what is left of the way, cost so far); a query that of
@@ -38,11 +39,6 @@ class Judging:
     sample: ca.Function
     last: ca.Function
     weights: np.ndarray
-
-    def __post_init__(self) -> None:
-        """Built with the design: compiling takes seconds that no sample has."""
-        if self._lanes is None:
-            _ = self._several
 
     def costs(self, x: np.ndarray, shares: np.ndarray, query: np.ndarray) -> np.ndarray:
         """Costs in samples, shape (n,), of shares (n, N, 2) from a state (4,)."""
@@ -58,11 +54,11 @@ class Judging:
         missing = -len(shares) % AT_ONCE
         filled = np.concatenate([shares, np.repeat(shares[-1:], missing, axis=0)])
         parts = filled.reshape(-1, AT_ONCE * len(self.weights) * 2)
-        costs = np.concatenate([self._several(x, part, query)[0] for part in parts])
+        costs = np.concatenate([self._by_casadi(x, part, query)[0] for part in parts])
         return costs[: len(shares)]
 
     @cached_property
-    def _several(self) -> Callable[..., list[np.ndarray]]:
+    def _by_casadi(self) -> Callable[..., list[np.ndarray]]:
         """(x, shares (2, N AT_ONCE), query) -> costs (AT_ONCE,), by CasADi alone."""
         horizon = len(self.weights)
         start, shares = ca.MX.sym("x", 4), ca.MX.sym("shares", 2, horizon)
@@ -84,12 +80,3 @@ class Judging:
             library.judge.argtypes = [ctypes.c_longlong, *[ctypes.c_void_p] * 5]
             library.judge.restype = None
         return library
-
-    def __setstate__(self, state: dict[str, object]) -> None:
-        self.__dict__.update(state)
-        self.__post_init__()
-
-    def __getstate__(self) -> dict[str, object]:
-        """Without what another process makes anew."""
-        made = ("_several", "_lanes")
-        return {key: value for key, value in self.__dict__.items() if key not in made}

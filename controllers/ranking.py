@@ -15,6 +15,7 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 
+from controllers.with_lanes import WithLanes
 from workbench.called import prepared
 from workbench.compiled import compiled
 from workbench.lanes import address, lane_library
@@ -23,7 +24,7 @@ DRIVER = Path(__file__).with_name("ranking.c")
 
 
 @dataclass(frozen=True)
-class Ranking:
+class Ranking(WithLanes):
     """Costs of all pairs of ``plans`` of each valve.
 
     ``pair`` is (way with the first (2 N,), what the second changes (2 N,), query, x) -> cost.
@@ -31,11 +32,6 @@ class Ranking:
 
     pair: ca.Function
     plans: int
-
-    def __post_init__(self) -> None:
-        """Built with the design: compiling takes seconds that no sample has."""
-        if self._lanes is None:
-            _ = self._by_casadi
 
     def costs(
         self, way: np.ndarray, moves: list[np.ndarray], query: np.ndarray, x: np.ndarray
@@ -71,12 +67,3 @@ class Ranking:
             library.rank.argtypes = [ctypes.c_void_p] * 6
             library.rank.restype = None
         return library
-
-    def __setstate__(self, state: dict[str, object]) -> None:
-        self.__dict__.update(state)
-        self.__post_init__()
-
-    def __getstate__(self) -> dict[str, object]:
-        """Without what another process makes anew."""
-        made = ("_by_casadi", "_lanes")
-        return {key: value for key, value in self.__dict__.items() if key not in made}
