@@ -59,7 +59,8 @@ def next_recording_text(asked: NextRecording) -> str:
     """What to record next, and what that is expected to bring."""
     told = f"it tells apart {', '.join(asked.separates)}"
     if isfinite(asked.expected_gain):
-        told += f": the right one gains {number(asked.expected_gain, 3)} of chi2, expected"
+        told += f": the right one gains about {number(asked.expected_gain, 3)} of chi2"
+        told += " if nothing more is missing where it goes"
     told += "".join(f"; {one} and {other} stay alike" for one, other in asked.alike)
     return f"next recording: {asked.what}\n{told}"
 

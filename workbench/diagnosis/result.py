@@ -216,7 +216,8 @@ class NextRecording:
         The rivals, the likeliest first; ``nothing`` is the model as it is.
     expected_gain
         Chi2 by which the right rival should then be better than any other that is not alike, NaN
-        where nothing can be played.
+        where nothing can be played.  Errors count by their size in the recordings so far: where the
+        manoeuvre goes further than those and more is missing there, errors grow and less is gained.
     alike
         Pairs of rivals that it does not tell apart either.
     predicted
