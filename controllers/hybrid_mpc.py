@@ -100,6 +100,7 @@ class ShiftMemory:
     plans       commands from the last sample on, shape (k, 2, N), the best first
     start_m, target_m    where the shift was seen to begin and where it ends
     turn        its samples so far
+    met         whether the piston was at the target, as near as tolerated
     """
 
     sent: tuple[int, int] = (0, 0)
@@ -107,6 +108,7 @@ class ShiftMemory:
     start_m: float = 0.0
     target_m: float | None = None
     turn: int = 0
+    met: bool = False
 
     @property
     def plan(self) -> np.ndarray:
@@ -140,9 +142,10 @@ class HybridMpc:
         x = self._seen(estimate, target_m)
         if not np.isfinite(x).all():
             return self._sent(self._blind(last.memory), {"fallback": 1.0})
-        memory = self._towards(target_m, last.memory, float(x[2]))
-        full = self._full_drive(target_m, memory.sent)
-        asked_for, shifted = query(target_m, memory.start_m), _shifted(memory.plans)
+        place_m = float(x[STATES.index(POSITION)])
+        memory = self._towards(target_m, last.memory, place_m)
+        full, shifted = self._full_drive(target_m, memory.sent), _shifted(memory.plans)
+        asked_for = query(target_m, memory.start_m, place_m, memory.met)
         plans, costs = self.search.best(x, asked_for, memory.sent, shifted, full, memory.turn)
         changed = float((plans[0] != shifted[0]).any())
         cost_s = float(costs[0]) * self.sample_time_s
@@ -172,19 +175,21 @@ class HybridMpc:
         return x
 
     def _towards(self, target_m: float, memory: ShiftMemory, place_m: float) -> ShiftMemory:
-        """The memory with this target; a new one begins with the plans from the nearest position.
+        """The memory with this target and whether it was met.
 
-        Full drive is the last of them: it is what is left if valves have just been switched.
+        A new one begins with the plans from the nearest position.  Full drive is the last of them:
+        it is what is left if valves have just been switched.
         """
+        near = abs(place_m - target_m) < self.spec.within_m
         if target_m == memory.target_m:
-            return memory
+            return replace(memory, met=memory.met or near)
         full = self._full_drive(target_m, memory.sent)[None]
         nearest_m = min(self.drives, key=lambda start_m: abs(start_m - place_m))
         known = np.concatenate([self.launches.get((nearest_m, target_m), full[:0]), full])
         plans = known[self.search.keep(memory.sent, known)]
         last = np.broadcast_to(self.search.held(memory.sent)[:, :1], (len(plans), 2, 1))
         plans = np.concatenate([last, plans[:, :, :-1]], axis=2)
-        return replace(memory, plans=plans, start_m=place_m, target_m=target_m, turn=0)
+        return replace(memory, plans=plans, start_m=place_m, target_m=target_m, turn=0, met=near)
 
     def _full_drive(self, target_m: float, sent: tuple[int, int]) -> np.ndarray:
         """Both valves as soon as they may as they end at the target, shape (2, N)."""

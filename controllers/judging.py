@@ -15,10 +15,10 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 
-from controllers.with_lanes import WithLanes
+from controllers.with_lanes import WithLanes, filled
 from workbench.called import prepared
 from workbench.compiled import compiled
-from workbench.lanes import address, lane_library
+from workbench.lanes import address, declared, lane_library
 
 DRIVER = Path(__file__).with_name("judging.c")
 AT_ONCE = 8  # plans of one call without lanes
@@ -29,7 +29,7 @@ class Judging(WithLanes):
     """Costs of plans over N samples.
 
     A memory is (state (4,), what is left of the way, cost so far); a query that of
-    :class:`controllers.shift_prediction.ShiftPrediction`.
+    :func:`controllers.shift_prediction.query`, at whose last entry the way begins.
 
     sample     (memory, share (2,), query, weight) -> memory a sample later
     last       (memory, query) -> cost of the whole
@@ -41,42 +41,46 @@ class Judging(WithLanes):
     weights: np.ndarray
 
     def costs(self, x: np.ndarray, shares: np.ndarray, query: np.ndarray) -> np.ndarray:
-        """Costs in samples, shape (n,), of shares (n, N, 2) from a state (4,)."""
-        given = [np.ascontiguousarray(each, dtype=float) for each in (x, shares, query)]
+        """Costs in samples, shape (n,), of n >= 1 shares (n, N, 2) from a state (4,).
+
+        Raises
+        ------
+        ValueError
+            If a shape is another one.
+        """
+        begun = np.array([*x, query[-1], 0.0])
+        shapes = ((6,), (max(len(shares), 1), len(self.weights), 2), (4,))
+        given = filled((begun, shares, query), shapes)
         if self._lanes is None:
             return self._one_by_one(*given)
         costs = np.empty(len(shares))
-        rows = (*given, self.weights, costs)
-        self._lanes.judge(len(shares), *map(address, rows))
+        rows = (*given, np.ascontiguousarray(self.weights, dtype=float), costs)
+        self._lanes(len(shares), *map(address, rows))
         return costs
 
-    def _one_by_one(self, x: np.ndarray, shares: np.ndarray, query: np.ndarray) -> np.ndarray:
+    def _one_by_one(self, begun: np.ndarray, shares: np.ndarray, query: np.ndarray) -> np.ndarray:
         missing = -len(shares) % AT_ONCE
-        filled = np.concatenate([shares, np.repeat(shares[-1:], missing, axis=0)])
-        parts = filled.reshape(-1, AT_ONCE * len(self.weights) * 2)
-        costs = np.concatenate([self._by_casadi(x, part, query)[0] for part in parts])
+        whole = np.concatenate([shares, np.repeat(shares[-1:], missing, axis=0)])
+        parts = whole.reshape(-1, AT_ONCE * len(self.weights) * 2)
+        costs = np.concatenate([self._by_casadi(begun, part, query)[0] for part in parts])
         return costs[: len(shares)]
 
     @cached_property
     def _by_casadi(self) -> Callable[..., list[np.ndarray]]:
-        """(x, shares (2, N AT_ONCE), query) -> costs (AT_ONCE,), by CasADi alone."""
+        """(memory, shares (2, N AT_ONCE), query) -> costs (AT_ONCE,), by CasADi alone."""
         horizon = len(self.weights)
-        start, shares = ca.MX.sym("x", 4), ca.MX.sym("shares", 2, horizon)
-        asked = ca.MX.sym("query", 3)
-        begun = ca.vertcat(start, asked[1] * (asked[0] - start[2]), 0.0)
+        begun, shares = ca.MX.sym("begun", 6), ca.MX.sym("shares", 2, horizon)
+        asked = ca.MX.sym("query", 4)
         weights = ca.DM(self.weights).T
         done = self.sample.fold(horizon)(begun, shares, ca.repmat(asked, 1, horizon), weights)
-        plan = ca.Function("plan", [start, shares, asked], [self.last(done, asked)])
+        plan = ca.Function("plan", [begun, shares, asked], [self.last(done, asked)])
         many = plan.map("plans", "serial", AT_ONCE, [0, 2], [])
-        inputs = [start, ca.MX.sym("all", 2, horizon * AT_ONCE), asked]
+        inputs = [begun, ca.MX.sym("all", 2, horizon * AT_ONCE), asked]
         return prepared(compiled(ca.Function("judged", inputs, [many(*inputs).T])))
 
     @cached_property
-    def _lanes(self) -> ctypes.CDLL | None:
+    def _lanes(self) -> Callable[..., None] | None:
         library = lane_library(
             DRIVER, {"HORIZON": len(self.weights)}, {"sample": self.sample, "last": self.last}
         )
-        if library is not None:
-            library.judge.argtypes = [ctypes.c_longlong, *[ctypes.c_void_p] * 5]
-            library.judge.restype = None
-        return library
+        return library and declared(library.judge, [ctypes.c_longlong, *[ctypes.c_void_p] * 5])

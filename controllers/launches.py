@@ -36,7 +36,7 @@ def launches(search: PlanSearch, rest: np.ndarray, places_m: Iterable[float]) ->
     for start_m, target_m in permutations(places_m, 2):
         start = rest.astype(float)
         start[STATES.index(POSITION)] = start_m
-        found[start_m, target_m] = _launches(search, start, query(target_m, start_m))
+        found[start_m, target_m] = _launches(search, start, query(target_m, start_m, start_m))
     return found
 
 

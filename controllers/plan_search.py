@@ -38,7 +38,7 @@ class PlanSearch:
 
     A state x is that of :data:`linearize.shifting.STATES` in SI units, shape (4,); ``sent`` are the
     last commands of each valve as integers, the newest lowest; the query is that of
-    :class:`ShiftPrediction`.
+    :func:`controllers.shift_prediction.query`.
 
     responses, prediction    what the valves pass, and what the piston does under that
     horizon     N, samples
@@ -86,7 +86,7 @@ class PlanSearch:
     ) -> np.ndarray:
         """Costs of plans by the nonlinear model, in samples, shape (n,)."""
         shares = np.stack(self._shares(sent, asked.transpose(1, 0, 2)), axis=-1)
-        by_model = self.prediction.judged.costs(x, shares, query)
+        by_model = self.prediction.judging.costs(x, shares, query)
         standing = np.broadcast_to(self.held(sent)[:, :1], (len(asked), 2, 1))
         switches = np.abs(np.diff(asked, axis=2, prepend=standing)).sum(axis=(1, 2))
         costs = by_model + self.price * switches
@@ -124,7 +124,7 @@ class PlanSearch:
             (response.ahead(s, p.packed) - along[v]) @ by_share[N * v : N * (v + 1)]
             for v, (response, s, p) in enumerate(zip(self.responses, sent, both, strict=True))
         ]
-        costs = self.prediction.ranked.costs(way, moves, query, x)
+        costs = self.prediction.ranking.costs(way, moves, query)
         costs += self.price * np.add.outer(*(p.switches for p in both)).ravel()
         costs[~np.isfinite(costs)] = np.inf
         chosen = np.argpartition(costs, self.judged)[: self.judged]

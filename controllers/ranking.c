@@ -1,10 +1,9 @@
 /* Costs of all pairs of plans in lanes: behind lanes.h, ROWS, PLANS and pair(); see ranking.py. */
-/* way (ROWS), first, second (ROWS, PLANS), query (3), x (4), costs (PLANS of the second, PLANS) */
+/* way (ROWS), first, second (ROWS, PLANS), query (4), costs (PLANS of the second, PLANS) */
 void rank(const double *way, const double *first, const double *second, const double *query,
-          const double *x, double *costs) {
-  v begun[ROWS], other[ROWS], asked[3], state[4], cost[1];
-  for (int i = 0; i < 3; i++) asked[i] = all(query[i]);
-  for (int i = 0; i < 4; i++) state[i] = all(x[i]);
+          double *costs) {
+  v begun[ROWS], other[ROWS], asked[4], cost[1];
+  for (int i = 0; i < 4; i++) asked[i] = all(query[i]);
   for (int j = 0; j < PLANS; j += LANES) {
     for (int l = 0; l < LANES; l++) {
       const int plan = j + l < PLANS ? j + l : PLANS - 1;
@@ -12,7 +11,7 @@ void rank(const double *way, const double *first, const double *second, const do
     }
     for (int i = 0; i < PLANS; i++) {
       for (int r = 0; r < ROWS; r++) begun[r] = all(way[r] + first[i * ROWS + r]);
-      pair(begun, other, asked, state, cost);
+      pair(begun, other, asked, cost);
       for (int l = 0; l < LANES && j + l < PLANS; l++) costs[i * PLANS + j + l] = cost[0][l];
     }
   }

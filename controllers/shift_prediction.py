@@ -1,7 +1,7 @@
 """What a gearbox actuator does under switching valves, and what that costs: three functions.
 
-``judged`` runs plans through the model of :mod:`linearize.shift_sample` as it is, ``linearised``
-gives its affine modes along one plan, and ``ranked`` the cost of every pair of plans under these
+``judging`` runs plans through the model of :mod:`linearize.shift_sample` as it is, ``linearised``
+gives its affine modes along one plan, and ``ranking`` the cost of every pair of plans under these
 modes, in which the effects of the two valves add up.  The cost is :mod:`controllers.shift_cost`.
 """
 
@@ -27,18 +27,16 @@ LONG_S, NEAREST_M = 0.3, 4e-3  # when a shift is over, and how far Neutral swing
 
 @dataclass(frozen=True)
 class ShiftPrediction:
-    """Compiled functions over N samples; a query is (target, side, 1 at a stop and 0 at Neutral).
-
-    ``side`` is the sign of the way to the target.
+    """Compiled functions over N samples; what is asked for is a :func:`query`.
 
     linearised    (x, shares (2, N)) -> positions and velocities (2 N,), their slopes (2 N, 2 N)
-    ranked        the costs of every pair of plans under these modes
-    judged        the costs of plans by the nonlinear model
+    ranking       the costs of every pair of plans under these modes
+    judging       the costs of plans by the nonlinear model
     """
 
     linearised: ca.Function
-    ranked: Ranking
-    judged: Judging
+    ranking: Ranking
+    judging: Judging
 
 
 def shift_prediction(
@@ -52,18 +50,21 @@ def shift_prediction(
     free = one_sample(model, stroke_m, sample_time_s, stops=False)
     return ShiftPrediction(
         linearised=compiled(_linearised(free, horizon)),
-        ranked=_ranking(stage, end, weights, plans),
-        judged=_judging(stopped, stage, end, weights),
+        ranking=_ranking(stage, end, weights, plans),
+        judging=_judging(stopped, stage, end, weights),
     )
 
 
-def query(target_m: float, start_m: float) -> np.ndarray:
-    """What a shift from one place to another is asked with, shape (3,).
+def query(target_m: float, start_m: float, place_m: float, met: bool = False) -> np.ndarray:
+    """What a shift is asked with on its way: (target, side, 1 at a stop and 0 at Neutral, left).
 
-    A stop is met from inside, wherever the noise of a sensor sees the start.
+    ``side`` is the sign of the way from ``start_m`` to the target; a stop is met from inside,
+    wherever the noise of a sensor sees the start.  ``left`` is the way that is left from
+    ``place_m``, at a stop the least so far: none where it was ``met``.
     """
     side = np.sign(target_m) if target_m else (1.0 if start_m <= 0.0 else -1.0)
-    return np.array([target_m, side, float(target_m != 0.0)])
+    at_stop, left_m = target_m != 0.0, side * (target_m - place_m)
+    return np.array([target_m, side, at_stop, min(left_m, 0.0) if at_stop and met else left_m])
 
 
 def drives(plant: Plant, sample_time_s: float) -> dict[float, tuple[int, int]]:
@@ -116,14 +117,13 @@ def _ranking(stage: ca.Function, end: ca.Function, weights: np.ndarray, plans: i
     horizon = len(weights)
     n = 2 * horizon
     begun, second = ca.SX.sym("begun", n), ca.SX.sym("second", n)
-    query, x = ca.SX.sym("query", 3), ca.SX.sym("x", 4)
-    at, total = begun + second, 0.0
-    far = query[1] * (query[0] - x[2])
+    query = ca.SX.sym("query", 4)
+    at, total, far = begun + second, 0.0, query[3]
     for k in range(horizon):
         paid, far = stage(far, at[k], at[horizon + k], query, weights[k])
         total += paid
     total += end(far, at[n - 1], query)
-    pair = ca.Function("pair", [begun, second, query, x], [ca.cse(total)])
+    pair = ca.Function("pair", [begun, second, query], [ca.cse(total)])
     return Ranking(pair, plans)
 
 
@@ -131,7 +131,7 @@ def _judging(
     step: ca.Function, stage: ca.Function, end: ca.Function, weights: np.ndarray
 ) -> Judging:
     weight, total = ca.SX.sym("weight"), ca.SX.sym("total")
-    x, share, query = ca.SX.sym("x", 4), ca.SX.sym("share", 2), ca.SX.sym("query", 3)
+    x, share, query = ca.SX.sym("x", 4), ca.SX.sym("share", 2), ca.SX.sym("query", 4)
     far = ca.SX.sym("far")
     later, met_m_s = step(x, share)
     paid, left = stage(far, later[2], met_m_s, query, weight)

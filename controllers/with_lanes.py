@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import ctypes
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cached_property
 
 import numpy as np
@@ -20,8 +19,8 @@ class WithLanes:
             _ = self._by_casadi
 
     @cached_property
-    def _lanes(self) -> ctypes.CDLL | None:
-        """The library, its arguments declared; None where there is none."""
+    def _lanes(self) -> Callable[..., None] | None:
+        """What runs in lanes; None where nothing does."""
         raise NotImplementedError
 
     @cached_property
@@ -36,3 +35,18 @@ class WithLanes:
     def __setstate__(self, state: dict[str, object]) -> None:
         self.__dict__.update(state)
         self.__post_init__()
+
+
+def filled(given: Iterable[np.ndarray], shapes: Iterable[tuple[int, ...]]) -> list[np.ndarray]:
+    """Arrays as C reads them.
+
+    Raises
+    ------
+    ValueError
+        If one has another shape: C would read beyond its end.
+    """
+    found = [np.ascontiguousarray(each, dtype=float) for each in given]
+    for each, shape in zip(found, shapes, strict=True):
+        if each.shape != shape:
+            raise ValueError(f"plans are costed from {shape}, given is {each.shape}")
+    return found

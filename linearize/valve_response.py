@@ -43,6 +43,10 @@ class ValveResponse:
     histories: np.ndarray
     shares: np.ndarray
 
+    def __post_init__(self) -> None:
+        """Ready, so that no first sample has to wait."""
+        _ = self._places
+
     @cached_property
     def _places(self) -> np.ndarray:
         """Place of each history; -1 for those that do not keep ``hold``."""
@@ -50,14 +54,13 @@ class ValveResponse:
         places[self.histories] = np.arange(len(self.histories))
         return places
 
-    def prepared(self) -> ValveResponse:
-        """The same table, ready, so that the first sample need not wait."""
-        _ = self._places
-        return self
-
     def __getstate__(self) -> dict[str, object]:
         """Without the places, which another process finds again."""
         return {key: value for key, value in self.__dict__.items() if key != "_places"}
+
+    def __setstate__(self, state: dict[str, object]) -> None:
+        self.__dict__.update(state)
+        self.__post_init__()
 
     def ahead(self, past: int, plans: np.ndarray) -> np.ndarray:
         """Shares under plans that begin after a history, shape of ``plans``.
@@ -137,7 +140,7 @@ def valve_response(plant: Plant, valve: str, sample_time_s: float, hold: int) ->
     shares = (np.trapezoid(seen, axis=0) / FINER - low) / (high - low)
     histories = packed(commands)[:, -1]
     order = np.argsort(histories)
-    return ValveResponse(hold, histories[order], shares[order]).prepared()
+    return ValveResponse(hold, histories[order], shares[order])
 
 
 def admissible(hold: int) -> np.ndarray:

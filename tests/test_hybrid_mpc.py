@@ -118,14 +118,14 @@ def test_the_affine_modes_along_a_plan_cost_what_the_nonlinear_model_does(made):
     horizon = HybridMpcSpec().horizon
     plan = np.zeros((2, horizon), dtype=int)
     plan[1] = 1  # towards Low, which it does not reach within the horizon
-    query, count = np.array([-12e-3, -1.0, 1.0]), len(made.search.plans(0).switches)
+    asked, count = query(-12e-3, 0.0, 0.0), len(made.search.plans(0).switches)
     shares = np.array(
         [r.ahead(0, packed(row)) for r, row in zip(made.search.responses, plan, strict=True)]
     )
     way, _ = called(made.search.prediction.linearised, VENTED, shares)
     nothing = np.zeros((count, 2 * horizon))
-    ranked = made.search.prediction.ranked.costs(way, [nothing] * 2, query, VENTED)
-    (judged,) = made.search.prediction.judged.costs(VENTED, shares.T[None], query)
+    ranked = made.search.prediction.ranking.costs(way.ravel(), [nothing] * 2, asked)
+    (judged,) = made.search.prediction.judging.costs(VENTED, shares.T[None], asked)
 
     assert ranked == pytest.approx(np.full(ranked.shape, judged), rel=1e-9)
 
@@ -177,6 +177,32 @@ def test_a_speed_that_may_be_noise_switches_nothing_at_rest(made):
     assert made._seen(sure, 0.0)[3] == -0.12
 
 
+@pytest.mark.parametrize("end_m", [-12e-3, 12e-3])
+def test_at_rest_at_an_end_nothing_switches(made, end_m):
+    """Within the noise of its sensor a piston at its end is not on its way there."""
+    command, random = made.start(), np.random.default_rng(2)
+    for _ in range(60):
+        x = [1.013e5, 1.013e5, end_m - np.sign(end_m) * 1e-6, 0.0]
+        noise = random.standard_normal(4) * [0.0, 0.0, 2e-5, 0.0]
+        command = made.step(command, to(end_m), seen(x + noise))
+
+    assert command.memory.met and command.memory.sent == (0, 0)
+
+
+def test_an_end_that_was_met_is_not_on_its_way_again_when_the_piston_bounces(made):
+    command = made.step(made.start(), to(12e-3), seen([4e5, 2e5, 11e-3, 1.0]))
+    assert not command.memory.met
+    command = made.step(command, to(12e-3), seen([4e5, 2e5, 12e-3, 0.2]))
+    bounced = made.step(command, to(12e-3), seen([4e5, 2e5, 11.5e-3, -0.2]))
+
+    assert bounced.memory.met
+    assert query(12e-3, 0.0, 11.5e-3, bounced.memory.met)[3] == 0.0
+    assert query(12e-3, 0.0, 11.5e-3)[3] == pytest.approx(0.5e-3)
+    turned = made.step(bounced, to(0.0), seen([4e5, 2e5, 11.5e-3, -0.2]))
+    assert not turned.memory.met
+    assert query(0.0, 12e-3, 1e-3, met=True)[3] == query(0.0, 12e-3, 1e-3)[3] > 0.0
+
+
 def test_without_an_answer_the_last_plan_goes_on(made):
     before = made.step(made.start(), to(12e-3), seen(VENTED))
     lost = made.step(before, to(12e-3), seen([np.nan] * 4))
@@ -205,7 +231,8 @@ def test_a_new_target_waits_for_an_estimate(made):
 @pytest.mark.parametrize("end_m", [-12e-3, 12e-3])
 def test_a_shift_that_is_called_back_ends_where_it_began(made, end_m):
     """The sensor sees the piston 20 um past its stop: that is no way to the other one."""
-    assert query(end_m, end_m + np.sign(end_m) * 2e-5)[1] == np.sign(end_m)
+    beyond_m = end_m + np.sign(end_m) * 2e-5
+    assert query(end_m, beyond_m, beyond_m)[1] == np.sign(end_m)
     step = one_sample(softened(gearbox()), half_stroke_m(gearbox()), 1e-3, stops=True)
     x, command = np.array([1.013e5, 1.013e5, end_m, 0.0]), made.start()
     command = made.step(command, to(end_m), seen(x))

@@ -152,7 +152,7 @@ def test_what_has_run_travels_and_is_copied(drive):
 def test_an_output_that_is_always_zero_keeps_its_row(drive):
     found, zero = drawn(drive, 4 * LENGTH), ca.SX(1, 1)
     model = replace(drive.model, outputs=ca.vertcat(zero, drive.model.outputs))
-    model = replace(model, measured=("none", *model.measured), _lockstep={})
+    model = replace(model, measured=("none", *model.measured))
     given = found.x[:, ::LENGTH], found.u, found.d, np.tile(found.p[:, None], 4), 4, 1
 
     rows = model.lockstep(DT)(*given)

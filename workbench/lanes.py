@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import ctypes
 import logging
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import casadi as ca
@@ -130,6 +130,12 @@ def lane_library(
     defined = [f"#define {name} {value}" for name, value in sizes.items()]
     head, rest = (path.read_text(encoding="utf-8") for path in (HEAD, driver))
     return loaded(driver.stem, "\n".join([head, *defined, *written, rest]), NATIVE, FLAGS)
+
+
+def declared(function: Callable[..., None], arguments: list[type]) -> Callable[..., None]:
+    """A function of a library that returns nothing, with the types of its arguments."""
+    function.argtypes, function.restype = arguments, None
+    return function
 
 
 def address(values: np.ndarray) -> ctypes.c_void_p:

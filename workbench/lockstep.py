@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from workbench.lanes import address, lane_library
+from workbench.lanes import address, declared, lane_library
 from workbench.rosenbrock import FINER, LEVELS, checked_step, steps_of
 
 if TYPE_CHECKING:
@@ -109,6 +109,5 @@ def lockstep(model: Model, sample_time_s: float) -> Lockstep | None:
     if found is None:
         return None
     count, place = ctypes.c_longlong, ctypes.c_void_p
-    found.run.argtypes = [count, place, count, *[place] * 5]
-    found.run.restype = None
-    return Lockstep(sizes, found.lanes(), found.run)
+    run = declared(found.run, [count, place, count, *[place] * 5])
+    return Lockstep(sizes, found.lanes(), run)

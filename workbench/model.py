@@ -64,10 +64,10 @@ class Model:
     paths: tuple[FlowPath, ...]
     tolerances: np.ndarray
     conditions: Conditions = field(repr=False)
-    _steps: dict[float, ca.Function] = field(default_factory=dict, repr=False)
-    _compiled: dict[float, ca.Function] = field(default_factory=dict, repr=False)
-    _blocks: dict[float, ca.Function] = field(default_factory=dict, repr=False)
-    _lockstep: dict[float, Lockstep | None] = field(default_factory=dict, repr=False)
+    _steps: dict[float, ca.Function] = field(default_factory=dict, init=False, repr=False)
+    _compiled: dict[float, ca.Function] = field(default_factory=dict, init=False, repr=False)
+    _blocks: dict[float, ca.Function] = field(default_factory=dict, init=False, repr=False)
+    _lockstep: dict[float, Lockstep | None] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
     def f(self) -> ca.Function:
