@@ -139,7 +139,8 @@ def where_text(found: Diagnosis) -> str:
         lines.append(f"missing term of {where.balance} follows {', '.join(follows)}")
     lines += [] if where.memory is None else [_memory_text(*where.memory)]
     shares = [f"{name} {percent(share)}" for name, share in where.by_regime.items()][:4]
-    return "\n".join([*lines, *([f"error in: {', '.join(shares)}"] if shares else [])])
+    left = f"error left by the prior fit (regimes overlap): {', '.join(shares)}"
+    return "\n".join([*lines, *([left] if shares else [])])
 
 
 def _memory_text(followed: Dependence, loop: Loop) -> str:

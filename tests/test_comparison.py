@@ -87,7 +87,7 @@ def test_a_wrong_mass_shows_at_every_horizon_and_most_in_the_free_run(good, bad)
 
 
 def test_a_friction_that_is_too_large_shows_where_the_slide_moves(drive, recording):
-    slow = replace(drive, plant=drive.plant.with_values({"friction.viscous_n_s_m": 150.0}))
+    slow = replace(drive, plant=drive.plant.with_values({"friction.viscous_n_s_m": 90.0}))
     found = compare(slow, [recording]).recordings[0]
     share = {regime.name: regime for regime in found.by_regime}
 
@@ -280,19 +280,3 @@ def test_it_is_said_from_when_on_a_filter_gave_nothing(recording):
 
     assert said == "one step: the filter gave nothing for 75 % of the samples, the first at 0.15 s"
     assert lost(recording, {POSITION: np.zeros(len(recording))}) == []
-
-
-def test_a_gearbox_is_foretold_as_closely_as_its_noise():
-    """The valve is released while the piston travels: the current of its coil dies away."""
-    rig, n = default_rig("gearbox"), 260
-    held = {"valve_1.command": 1.0 * (np.arange(n) < 60), "valve_2.command": np.zeros(n)}
-    clean, rng = run(rig, Recording("a shift", DT, held)), np.random.default_rng(6)
-    noise = {k: 2e-5 if k.endswith("position_m") else 1e3 for k in rig.plant.measured}
-    noisy = {k: clean[k] + size * rng.standard_normal(n) for k, size in noise.items()}
-
-    found = compare(rig, [Recording("a shift", DT, {**held, **noisy}, noise=noise)]).recordings[0]
-
-    for name, size in noise.items():
-        assert found.errors[ONE_STEP][name].rmse < 3.0 * size, name
-        assert found.errors[WINDOW][name].rmse < 1.1 * size, name
-    assert not any("gave nothing" in note for note in found.notes)

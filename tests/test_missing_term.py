@@ -184,9 +184,11 @@ def test_what_is_not_known_of_a_missing_term_has_no_line():
     found = diagnosis()
     bare = replace(found, where=replace(found.where, against=(), by_regime={}))
 
-    assert "follows" in diagnosis_text(found, UNITS) and "error in" in diagnosis_text(found, UNITS)
+    assert "follows" in diagnosis_text(found, UNITS) and "regimes overlap" in diagnosis_text(
+        found, UNITS
+    )
     text = diagnosis_text(bare, UNITS)
-    assert "where: " in text and "follows" not in text and "error in" not in text
+    assert "where: " in text and "follows" not in text and "regimes overlap" not in text
 
 
 def test_the_legend_of_the_missing_term_stands_above_it():

@@ -26,7 +26,6 @@ import casadi as ca
 import numpy as np
 
 from workbench.compiled import compiled
-from workbench.effect import Effect
 from workbench.effects.bristle_friction import BristleFriction
 from workbench.plant import Plant, require
 from workbench.rosenbrock import controlled_step
@@ -66,6 +65,8 @@ class PlantFilter:
         per square root of a second.
     initial_deviation
         Standard deviation at the start by state, the plant's scale by default.
+    considered
+        States that no measurement corrects, though their uncertainty counts (Schmidt 1966).
     """
 
     plant: Plant
@@ -75,12 +76,13 @@ class PlantFilter:
     unknown_inputs: Mapping[str, float] = field(default_factory=dict)
     initial_deviation: Mapping[str, float] = field(default_factory=dict)
     decimate: int = 1
+    considered: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         states, who = self.plant.model.states, f"states of {self.plant.name}"
         wandering = self.plant.model.parameters
         rates = [name for name in self.unknown_inputs if name not in wandering]
-        for group in (self.process_noise, rates, self.initial_deviation):
+        for group in (self.process_noise, rates, self.initial_deviation, self.considered):
             require(group, states, who)
         missing = [n for n in self.plant.measured if self.measurement_noise.get(n, 0.0) <= 0.0]
         if missing:
@@ -257,9 +259,10 @@ class PlantFilter:
 
     @property
     def corrected(self) -> np.ndarray:
-        """1 for what a measurement corrects, 0 for bristles, shape (n_x + n_w,)."""
-        bristles = [f"{m.name}.deflection_m" for m in self.plant.members if _slides(m)]
-        free = [float(name not in bristles) for name in self.plant.model.states]
+        """1 for what a measurement corrects, 0 for bristles and the considered, (n_x + n_w,)."""
+        sliding = (m.name for m in self.plant.members if isinstance(m, BristleFriction))
+        left = {*self.considered, *(f"{name}.deflection_m" for name in sliding)}
+        free = [float(name not in left) for name in self.plant.model.states]
         return np.array([*free, *[1.0] * len(self.unknown_inputs)])
 
     @cached_property
@@ -293,7 +296,3 @@ class PlantFilter:
         rates = ca.substitute(model.rates, p, p + ca.DM(self._wandering) @ w)
         rates += ca.DM(self._entering) @ w
         return controlled_step((x, u, d, ca.vertcat(p, w)), rates, dt, model.tolerances)
-
-
-def _slides(member: Effect) -> bool:
-    return isinstance(member, BristleFriction)

@@ -29,7 +29,7 @@ from workbench.comparison.horizons import (
 )
 from workbench.comparison.maps import ErrorMap, command_maps, motion_maps
 from workbench.comparison.noise import Noise, recorded_noise
-from workbench.comparison.regimes import regimes_of, shares
+from workbench.comparison.regimes import equally_weighted, regimes_of, shares
 from workbench.comparison.residuals import Residual, residual_of
 from workbench.consistency import examined
 from workbench.fitting.errors import SignalError
@@ -135,7 +135,10 @@ def _compared(rig: Rig, recording: Recording) -> RecordingComparison:
     ahead = simulated[_first_of((ONE_STEP, PLAIN), simulated)]
     errors = {name: measured[name] - judged[name] for name in measured}
     shifts, more = _shifts(course)
-    squared, length_s = _squared(errors), window_length_s(plant, [recording])
+    squared, length_s = (
+        equally_weighted(np.array([*errors.values()])),
+        window_length_s(plant, [recording]),
+    )
     return RecordingComparison(
         name=recording.name,
         time_s=recording.time_s,
@@ -206,18 +209,6 @@ def _pieces_in_words(recording: Recording) -> tuple[str, ...]:
     begins = ", ".join(f"{recording.sample_time_s * first:.4g}" for first in recording.starts)
     told = f"{len(recording.starts)} pieces stand one behind the other"
     return (f"{told}, from {begins} s on: times leave the gaps out",)
-
-
-def _squared(errors: Rows) -> np.ndarray:
-    """Squared error with the same weight for every output, (n,); NaN where nothing is.
-
-    In units of the noise a fine position sensor would outweigh every pressure.
-    """
-    rows = np.array([error**2 for error in errors.values()])
-    seen = np.isfinite(rows)
-    total = np.nansum(rows, axis=1, keepdims=True)
-    weighted = np.where(seen, rows, 0.0) / np.maximum(total, 1e-300)
-    return np.where(seen.any(axis=0), weighted.sum(axis=0), np.nan)
 
 
 def _worst(squared: np.ndarray, sample_time_s: float, window_s: float) -> tuple[Span, ...]:

@@ -56,10 +56,28 @@ def shares(chosen: Mapping[str, np.ndarray], squared: np.ndarray) -> dict[str, f
     return dict(sorted(found.items(), key=lambda item: -item[1]))
 
 
+def equally_weighted(errors: np.ndarray) -> np.ndarray:
+    """Squared error with the same weight for every output, (...,), of errors (n_y, ...) in SI.
+
+    NaN where there is none.  In units of the noise a fine position sensor would outweigh every
+    pressure.
+    """
+    squares = errors**2
+    seen = np.isfinite(squares)
+    total = np.nansum(squares, axis=tuple(range(1, squares.ndim)), keepdims=True)
+    weighted = np.where(seen, squares, 0.0) / np.maximum(total, 1e-300)
+    return np.where(seen.any(axis=0), weighted.sum(axis=0), np.nan)
+
+
 def regime_shares(fit: Fit) -> dict[str, float]:
-    """Share of the weighted squared error of a fit by regime, over all its recordings."""
+    """Share of the squared error of a fit by regime, over all its recordings.
+
+    Outputs weigh alike, as in a comparison.  A fit weighs windows by the typical errors in such
+    windows, and so those at rest a hundred times as much as full strokes: no user asks for that.
+    """
     windows, plant = fit.windows, fit.plant.lean()
-    squares = (fit.residual**2).sum(axis=0)
+    known = (windows.weight > 0) & ~fit.unsimulated
+    squares = equally_weighted(np.where(known, fit.residual * windows.scale[:, :, None], np.nan))
     sums: dict[str, float] = {}
     done = 0
     for recording, firsts in zip(windows.recordings, windows.firsts, strict=True):
@@ -70,7 +88,7 @@ def regime_shares(fit: Fit) -> dict[str, float]:
         course = Course(fit.plant, plant, recording, *guessed_states(plant, recording))
         for name, samples in regimes_of(course).items():
             sums[name] = sums.get(name, 0.0) + float(np.nansum(squared[samples]))
-    total = float(squares.sum())
+    total = float(np.nansum(squares))
     found = {name: part / total if total > 0 else 0.0 for name, part in sums.items()}
     return dict(sorted(found.items(), key=lambda item: -item[1]))
 

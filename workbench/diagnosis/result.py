@@ -142,7 +142,7 @@ class Where:
     against
         Its dependence on the driving variables, strongest first.
     by_regime
-        Share of the squared error by regime, largest first.
+        Share of the squared error of the prior fit by regime, largest first; regimes overlap.
     intensities
         Of the random walk that the term is, and the term at another one.
     imitated
