@@ -70,6 +70,9 @@ def _compared(each: RecordingComparison) -> Document:
             for shift in each.shifts
         ],
         "notes": list(each.notes),
+        "findings": [
+            {**vars(finding), "weight": finding.weight.value} for finding in each.findings
+        ],
     }
 
 
