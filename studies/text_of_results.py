@@ -7,6 +7,7 @@ from math import isfinite
 from typing import TYPE_CHECKING
 
 from studies.text import columns, number, percent, removed, shown
+from studies.text_of_next_recording import next_recording_text
 from workbench.units import public_name
 
 if TYPE_CHECKING:
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
 
     from workbench.diagnosis.addition import Addition
     from workbench.diagnosis.missing_term import Dependence, Loop
-    from workbench.diagnosis.result import Diagnosis, Law, NextRecording, Ranked
+    from workbench.diagnosis.result import Diagnosis, Law, Ranked
     from workbench.fitting.errors import SignalError
     from workbench.fitting.fit import FitReport
     from workbench.fitting.posterior import Moved
@@ -53,16 +54,6 @@ def _imitated_text(leader: Ranked) -> list[str]:
         for name, share in leader.imitated_by.items()
         if name in leader.tied_with
     ]
-
-
-def next_recording_text(asked: NextRecording) -> str:
-    """What to record next, and what that is expected to bring."""
-    told = f"it tells apart {', '.join(asked.separates)}"
-    if isfinite(asked.expected_gain):
-        told += f": the right one gains about {number(asked.expected_gain, 3)} of chi2"
-        told += " if nothing more is missing where it goes"
-    told += "".join(f"; {one} and {other} stay alike" for one, other in asked.alike)
-    return f"next recording: {asked.what}\n{told}"
 
 
 def ranking_text(found: Diagnosis) -> str:
