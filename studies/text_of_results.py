@@ -144,22 +144,26 @@ def _memory_text(followed: Dependence, loop: Loop) -> str:
 
 def before_after_text(before: Errors, after: Errors, unit_of: Mapping[str, str]) -> str:
     """RMSE and fit of each output before and after, on each set, and what they leave out."""
+    return errors_over({"before": before, "after": after}, unit_of)
+
+
+def errors_over(states: Mapping[str, Errors], unit_of: Mapping[str, str]) -> str:
+    """RMSE and fit of each output in each state of a rig, by its words; and what they leave out.
+
+    The first state has all sets and outputs.
+    """
+    first, *_ = states.values()
     rows = []
-    for label in before:
-        for name, old in before[label].items():
-            new, full = after.get(label, {}).get(name), unit_of.get(name, name)
-            rows.append(
-                (
-                    label,
-                    name,
-                    shown(old.rmse, full),
-                    shown(new.rmse, full) if new else "-",
-                    number(old.fit_percent, 3),
-                    number(new.fit_percent, 3) if new else "-",
-                )
-            )
-    table = columns(("set", "signal", "RMSE before", "after", "fit % before", "after"), rows)
-    return "\n".join((table, *_left_out(before, " before"), *_left_out(after, " after")))
+    for label, name in [(each, name) for each, row in first.items() for name in row]:
+        errors = [each.get(label, {}).get(name) for each in states.values()]
+        full = unit_of.get(name, name)
+        rmse = [shown(error.rmse, full) if error else "-" for error in errors]
+        fits = [number(error.fit_percent, 3) if error else "-" for error in errors]
+        rows.append((label, name, *rmse, *fits))
+    begun, *later = states
+    head = ("set", "signal", f"RMSE {begun}", *later, f"fit % {begun}", *later)
+    left_out = [line for when, each in states.items() for line in _left_out(each, f" {when}")]
+    return "\n".join((columns(head, rows), *left_out))
 
 
 def _left_out(sets: Errors, when: str = "") -> list[str]:

@@ -188,6 +188,30 @@ def test_what_a_diagnosis_warns_of_is_told_once(improved):
     assert improvement_document(doubtful, UNITS)["warnings"] == ["a doubt"]
 
 
+def test_the_budget_begins_with_the_rig_as_it_came_then_refitted(improved):
+    came, refitted, first, *_ = improved.budget
+    told = improvement_document(improved, UNITS)
+
+    assert [each.label for each in (came, refitted)] == ["as it came", "parameters refitted"]
+    assert came.train > refitted.train > first.train
+    for part in ("train", "validation"):
+        rmse = [each[part]["rod.force"].rmse for each in (improved.came, improved.before)]
+        assert told["as_it_came"][part]["rod.force"]["rmse"] == rmse[0] != rmse[1]
+    heads = [line.split() for line in improvement_text(improved, UNITS).splitlines()]
+    rmse = "RMSE as it came parameters refitted in the end"
+    assert any(rmse in " ".join(line) for line in heads)
+
+
+def test_the_last_steps_of_a_budget_can_be_seen_beside_the_first():
+    stages = [Stage(f"step {k}", size, size) for k, size in enumerate((1.7e4, 2600.0, 106.0, 20.6))]
+    (axes,) = budget_figure(stages).axes
+    low, high = (axes.transAxes.inverted().transform(axes.transData.transform((0, size)))[1]
+                 for size in (20.6, 106.0))  # fmt: skip
+
+    assert axes.get_ylim()[0] == 1.0 and axes.get_ylim()[1] > 1.7e4
+    assert high - low > 0.1
+
+
 def test_dropped_and_swapped_steps_are_marked_in_the_budget(improved):
     more = (
         improved.budget[-1]._replace(label="- constant_force", change=Change.DROPPED),
