@@ -9,6 +9,7 @@ from studies.documents import Document, errors, law_document, plain
 from studies.text import columns, number, removed
 from studies.text_of_results import errors_over, law_text, moved_text
 from workbench.diagnosis.improvement import Change
+from workbench.diagnosis.result import told
 from workbench.units import public_name, si_unit
 
 if TYPE_CHECKING:
@@ -122,8 +123,8 @@ def improvement_document(found: Improvement, unit_of: Mapping[str, str]) -> Docu
         "removals": [
             {
                 "effect": each.candidate.name,
-                "share_train": plain(each.share_train),
-                "share_validation": plain(each.share_validation),
+                "share_train": plain(told(each.share_train)),
+                "share_validation": plain(told(each.share_validation)),
                 "reasons": list(each.reasons),
                 "dropped": each.dropped,
             }
@@ -133,10 +134,10 @@ def improvement_document(found: Improvement, unit_of: Mapping[str, str]) -> Docu
             {
                 "effect": each.candidate.name,
                 "rival": each.rival.name,
-                "share_train": plain(each.share_train),
-                "share_validation": plain(each.share_validation),
-                "rival_share_train": plain(each.rival_train),
-                "rival_share_validation": plain(each.rival_validation),
+                "share_train": plain(told(each.share_train)),
+                "share_validation": plain(told(each.share_validation)),
+                "rival_share_train": plain(told(each.rival_train)),
+                "rival_share_validation": plain(told(each.rival_validation)),
                 "replaced": each.replaced,
             }
             for each in found.swaps
@@ -157,6 +158,8 @@ def improvement_document(found: Improvement, unit_of: Mapping[str, str]) -> Docu
                 "before_std": plain(row.prior_deviation),
                 "after": plain(row.after),
                 "after_std": plain(row.deviation),
+                "at_bound": row.at_bound,
+                "prior_deviations_moved": plain(row.far),
             }
             for row in found.parameters
         ],

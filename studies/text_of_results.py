@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 SHOWN_RANKS = 12
 CORRELATED = 0.9
+FAR_MOVED = 2.0  # prior deviations: more is told
 
 Errors = Mapping[str, Mapping[str, "SignalError"]]
 
@@ -223,16 +224,23 @@ def addition_text(found: Addition, unit_of: Mapping[str, str]) -> str:
 
 
 def moved_text(rows: Sequence[Moved]) -> str:
-    """Parameters with their standard deviations before and after."""
+    """Parameters with their standard deviations before and after, and what is odd about them."""
     told = [
         (
             public_name(row.name),
             spread(row.before, row.prior_deviation, row.name),
             spread(row.after, row.deviation, row.name),
+            "; ".join(_oddities(row)),
         )
         for row in rows
     ]
-    return columns(("parameter", "before", "after"), told)
+    return columns(("parameter", "before", "after", ""), told)
+
+
+def _oddities(row: Moved) -> list[str]:
+    """Where a parameter ended at a bound, or far from where it was believed to be."""
+    far = f"{number(row.far, 2)} prior deviations away"
+    return ["at its bound"] * row.at_bound + [far] * (row.far > FAR_MOVED)
 
 
 def fit_text(found: FitReport, unit_of: Mapping[str, str]) -> str:
