@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from studies.documents import Document, errors, law_document, plain
 from studies.text import columns, number, removed
-from studies.text_of_results import errors_over, law_text, moved_text
+from studies.text_of_results import errors_over, law_text, moved_text, windows_text
 from workbench.diagnosis.improvement import Change
 from workbench.diagnosis.result import told
 from workbench.units import public_name, si_unit
@@ -42,6 +42,7 @@ def improvement_text(found: Improvement, unit_of: Mapping[str, str]) -> str:
         parts += [law_text(found.law)]
     if found.parameters:
         parts += ["", errors_over(window_states(found), unit_of)]
+        parts += [windows_text(found.fit, found.validation_fit)]
         if found.free_before:
             free = errors_over(free_states(found), unit_of)
             parts += ["", FREE_RUNS, free]

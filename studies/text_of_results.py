@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from workbench.diagnosis.result import Diagnosis, Law, Ranked
     from workbench.fitting.errors import SignalError
     from workbench.fitting.fit import FitReport
+    from workbench.fitting.gauss_newton import Fit
     from workbench.fitting.posterior import Moved
 
 SHOWN_RANKS = 12
@@ -167,6 +168,22 @@ def errors_over(states: Mapping[str, Errors], unit_of: Mapping[str, str]) -> str
     return "\n".join((columns(head, rows), *left_out))
 
 
+def windows_text(fit: Fit, held_out: Fit | None) -> str:
+    """What errors of a fit are over, and why a comparison of the same rig gives others."""
+    windows = fit.windows
+    length_s = windows.length * windows.recordings[0].sample_time_s
+    counts = f"{len(windows)} in training"
+    if held_out:
+        counts += f", {len(held_out.windows)} held out"
+    told = f"errors over windows of {length_s:.3g} s, {counts}"
+    if not windows.plant.state_list:
+        return told
+    return (
+        f"{told}, each from a start that is fitted with the weights of this fit; `compare` takes "
+        "all windows and weighs by sensor noise alone, so its RMSE is another"
+    )
+
+
 def _left_out(sets: Errors, when: str = "") -> list[str]:
     """What the errors do not count, in words."""
     return [
@@ -219,8 +236,9 @@ def addition_text(found: Addition, unit_of: Mapping[str, str]) -> str:
     if isfinite(found.drop_validation):
         drops += f", {removed(found.drop_validation)} of {found.evidence.value}"
     parameters = moved_text(found.parameters)
-    errors = before_after_text(found.before, found.after, unit_of)
-    return "\n".join((errors, drops, "", parameters))
+    errors = errors_over({"without it": found.before, "with it": found.after}, unit_of)
+    windows = windows_text(found.fit, found.validation_fit)
+    return "\n".join((errors, windows, drops, "", parameters))
 
 
 def moved_text(rows: Sequence[Moved]) -> str:
@@ -258,7 +276,8 @@ def fit_text(found: FitReport, unit_of: Mapping[str, str]) -> str:
     ]
     parts = [columns(("parameter", "prior", "fitted", ""), rows), ""]
     parts += correlation_lines([row.name for row in found.rows], found.correlations)
-    parts += ["", before_after_text(found.before, found.after, unit_of)]
+    parts += ["", errors_over({"as it came": found.before, "fitted": found.after}, unit_of)]
+    parts += [windows_text(found.fit, found.validation_fit)]
     return "\n".join(parts + ([] if found.converged else ["warning: the fit did not converge"]))
 
 

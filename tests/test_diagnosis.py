@@ -200,7 +200,11 @@ def test_adding_without_validation_warns_and_improving_refuses(rig):
     with pytest.warns(UserWarning, match="no validation recording"):
         step = add(rig, "coulomb_friction", [bench(1, coulomb)])
     assert step.rig.notes[-1].endswith("in the last third of the training recordings")
-    assert "of the last third of the training recordings" in addition_text(step, {})
+    told = addition_text(step, {})
+    assert "of the last third of the training recordings" in told
+    assert "RMSE without it  with it" in told
+    counts = [len(each.windows) for each in (step.fit, step.validation_fit)]
+    assert f"{counts[0]} in training, {counts[1]} held out" in told
     with pytest.raises(ValueError, match="needs a validation recording"):
         improve(rig, [bench(1, coulomb)], [])
 

@@ -55,6 +55,7 @@ class FitReport:
     after: Errors
     converged: bool
     fit: Fit = field(repr=False)
+    validation_fit: Fit | None = field(default=None, repr=False)
 
 
 def fit(
@@ -105,6 +106,7 @@ def fit(
         after=errors_of(base, problem.base_validation),
         converged=base.converged,
         fit=base,
+        validation_fit=problem.base_validation,
     )
 
 
