@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from workbench.diagnosis.passes import Removal, Swap
     from workbench.fitting.errors import Errors
 
-CAME, REFITTED, END = (Change.START.value, Change.REFITTED.value, "in the end")
+CAME, REFITTED, END = (Change.START.value, "refitted", "in the end")
 FREE_RUNS = (
     "free runs over whole recordings (no judge where positions integrate: the right effect can "
     "make them worse until the next one is there):"
