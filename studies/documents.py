@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
+from studies.text_of_next_recording import conduct_document
 from workbench.diagnosis.result import told
 from workbench.units import public_name, si_unit
 
@@ -70,6 +71,9 @@ def _compared(each: RecordingComparison) -> Document:
             for shift in each.shifts
         ],
         "notes": list(each.notes),
+        "findings": [
+            {**vars(finding), "weight": finding.weight.value} for finding in each.findings
+        ],
     }
 
 
@@ -252,6 +256,7 @@ def _next_recording(asked: NextRecording | None) -> Document | None:
         "separates": list(asked.separates),
         "expected_gain": plain(asked.expected_gain),
         "alike": [list(pair) for pair in asked.alike],
+        "conduct": conduct_document(asked.conduct) if asked.conduct else None,
     }
 
 

@@ -7,13 +7,17 @@ from typing import TYPE_CHECKING
 
 from studies.documents import Document, errors, law_document, plain
 from studies.text import columns, number, removed
-from studies.text_of_results import before_after_text, law_text, moved_text
+from studies.text_of_results import errors_over, law_text, moved_text, windows_text
+from workbench.diagnosis.improvement import Change
+from workbench.diagnosis.result import told
 from workbench.units import public_name, si_unit
 
 if TYPE_CHECKING:
-    from workbench.diagnosis.improvement import Improvement
+    from workbench.diagnosis.improvement import Improvement, Stage
     from workbench.diagnosis.passes import Removal, Swap
+    from workbench.fitting.errors import Errors
 
+CAME, REFITTED, END = (Change.START.value, "refitted", "in the end")
 FREE_RUNS = (
     "free runs over whole recordings (no judge where positions integrate: the right effect can "
     "make them worse until the next one is there):"
@@ -24,7 +28,7 @@ def improvement_text(found: Improvement, unit_of: Mapping[str, str]) -> str:
     """The falling error, what was added and thought over, errors and parameters."""
     head = ("with", "", "chi2 per sample, training", "validation")
     rows = [
-        (stage.label, stage.change.value, number(stage.train), number(stage.validation))
+        (stage.label, _change(stage), number(stage.train), number(stage.validation))
         for stage in found.budget
     ]
     parts = [columns(head, rows), ""]
@@ -37,12 +41,28 @@ def improvement_text(found: Improvement, unit_of: Mapping[str, str]) -> str:
         parts += ["", "nothing of the catalogue earns its place any more; taken at the end:"]
         parts += [law_text(found.law)]
     if found.parameters:
-        parts += ["", before_after_text(found.before, found.after, unit_of)]
+        parts += ["", errors_over(window_states(found), unit_of)]
+        parts += [windows_text(found.fit, found.validation_fit)]
         if found.free_before:
-            free = before_after_text(found.free_before, found.free_after, unit_of)
+            free = errors_over(free_states(found), unit_of)
             parts += ["", FREE_RUNS, free]
         parts += ["", moved_text(found.parameters)]
     return "\n".join(parts)
+
+
+def window_states(found: Improvement) -> dict[str, Errors]:
+    """Errors over windows by what the rig was then."""
+    return {CAME: found.came, REFITTED: found.before, END: found.after}
+
+
+def free_states(found: Improvement) -> dict[str, Errors]:
+    """Errors of free runs by what the rig was then."""
+    return {CAME: found.free_before, END: found.free_after}
+
+
+def _change(stage: Stage) -> str:
+    """What a step did, where its label does not say it."""
+    return "" if stage.label == stage.change.value else stage.change.value
 
 
 def thoughts_text(found: Improvement) -> list[str]:
@@ -104,8 +124,8 @@ def improvement_document(found: Improvement, unit_of: Mapping[str, str]) -> Docu
         "removals": [
             {
                 "effect": each.candidate.name,
-                "share_train": plain(each.share_train),
-                "share_validation": plain(each.share_validation),
+                "share_train": plain(told(each.share_train)),
+                "share_validation": plain(told(each.share_validation)),
                 "reasons": list(each.reasons),
                 "dropped": each.dropped,
             }
@@ -115,15 +135,16 @@ def improvement_document(found: Improvement, unit_of: Mapping[str, str]) -> Docu
             {
                 "effect": each.candidate.name,
                 "rival": each.rival.name,
-                "share_train": plain(each.share_train),
-                "share_validation": plain(each.share_validation),
-                "rival_share_train": plain(each.rival_train),
-                "rival_share_validation": plain(each.rival_validation),
+                "share_train": plain(told(each.share_train)),
+                "share_validation": plain(told(each.share_validation)),
+                "rival_share_train": plain(told(each.rival_train)),
+                "rival_share_validation": plain(told(each.rival_validation)),
                 "replaced": each.replaced,
             }
             for each in found.swaps
         ],
         "law": law_document(found.law) if found.law else None,
+        "as_it_came": errors(found.came, unit_of),
         "before": errors(found.before, unit_of),
         "after": errors(found.after, unit_of),
         "free_run": {
@@ -138,6 +159,8 @@ def improvement_document(found: Improvement, unit_of: Mapping[str, str]) -> Docu
                 "before_std": plain(row.prior_deviation),
                 "after": plain(row.after),
                 "after_std": plain(row.deviation),
+                "at_bound": row.at_bound,
+                "prior_deviations_moved": plain(row.far),
             }
             for row in found.parameters
         ],

@@ -7,6 +7,7 @@ from math import isfinite
 from typing import TYPE_CHECKING
 
 from studies.text import columns, number, percent, removed, shown
+from studies.text_of_next_recording import next_recording_text
 from workbench.units import public_name
 
 if TYPE_CHECKING:
@@ -14,13 +15,15 @@ if TYPE_CHECKING:
 
     from workbench.diagnosis.addition import Addition
     from workbench.diagnosis.missing_term import Dependence, Loop
-    from workbench.diagnosis.result import Diagnosis, Law, NextRecording, Ranked
+    from workbench.diagnosis.result import Diagnosis, Law, Ranked
     from workbench.fitting.errors import SignalError
     from workbench.fitting.fit import FitReport
+    from workbench.fitting.gauss_newton import Fit
     from workbench.fitting.posterior import Moved
 
 SHOWN_RANKS = 12
 CORRELATED = 0.9
+FAR_MOVED = 2.0  # prior deviations: more is told
 
 Errors = Mapping[str, Mapping[str, "SignalError"]]
 
@@ -53,16 +56,6 @@ def _imitated_text(leader: Ranked) -> list[str]:
         for name, share in leader.imitated_by.items()
         if name in leader.tied_with
     ]
-
-
-def next_recording_text(asked: NextRecording) -> str:
-    """What to record next, and what that is expected to bring."""
-    told = f"it tells apart {', '.join(asked.separates)}"
-    if isfinite(asked.expected_gain):
-        told += f": the right one gains about {number(asked.expected_gain, 3)} of chi2"
-        told += " if nothing more is missing where it goes"
-    told += "".join(f"; {one} and {other} stay alike" for one, other in asked.alike)
-    return f"next recording: {asked.what}\n{told}"
 
 
 def ranking_text(found: Diagnosis) -> str:
@@ -154,22 +147,42 @@ def _memory_text(followed: Dependence, loop: Loop) -> str:
 
 def before_after_text(before: Errors, after: Errors, unit_of: Mapping[str, str]) -> str:
     """RMSE and fit of each output before and after, on each set, and what they leave out."""
+    return errors_over({"before": before, "after": after}, unit_of)
+
+
+def errors_over(states: Mapping[str, Errors], unit_of: Mapping[str, str]) -> str:
+    """RMSE and fit of each output in each state of a rig, by its words; and what they leave out.
+
+    The first state has all sets and outputs.
+    """
+    first, *_ = states.values()
     rows = []
-    for label in before:
-        for name, old in before[label].items():
-            new, full = after.get(label, {}).get(name), unit_of.get(name, name)
-            rows.append(
-                (
-                    label,
-                    name,
-                    shown(old.rmse, full),
-                    shown(new.rmse, full) if new else "-",
-                    number(old.fit_percent, 3),
-                    number(new.fit_percent, 3) if new else "-",
-                )
-            )
-    table = columns(("set", "signal", "RMSE before", "after", "fit % before", "after"), rows)
-    return "\n".join((table, *_left_out(before, " before"), *_left_out(after, " after")))
+    for label, name in [(each, name) for each, row in first.items() for name in row]:
+        errors = [each.get(label, {}).get(name) for each in states.values()]
+        full = unit_of.get(name, name)
+        rmse = [shown(error.rmse, full) if error else "-" for error in errors]
+        fits = [number(error.fit_percent, 3) if error else "-" for error in errors]
+        rows.append((label, name, *rmse, *fits))
+    begun, *later = states
+    head = ("set", "signal", f"RMSE {begun}", *later, f"fit % {begun}", *later)
+    left_out = [line for when, each in states.items() for line in _left_out(each, f" {when}")]
+    return "\n".join((columns(head, rows), *left_out))
+
+
+def windows_text(fit: Fit, held_out: Fit | None) -> str:
+    """What errors of a fit are over, and why a comparison of the same rig gives others."""
+    windows = fit.windows
+    length_s = windows.length * windows.recordings[0].sample_time_s
+    counts = f"{len(windows)} in training"
+    if held_out:
+        counts += f", {len(held_out.windows)} held out"
+    told = f"errors over windows of {length_s:.3g} s, {counts}"
+    if not windows.plant.state_list:
+        return told
+    return (
+        f"{told}, each from a start that is fitted with the weights of this fit; `compare` takes "
+        "all windows and weighs by sensor noise alone, so its RMSE is another"
+    )
 
 
 def _left_out(sets: Errors, when: str = "") -> list[str]:
@@ -224,21 +237,29 @@ def addition_text(found: Addition, unit_of: Mapping[str, str]) -> str:
     if isfinite(found.drop_validation):
         drops += f", {removed(found.drop_validation)} of {found.evidence.value}"
     parameters = moved_text(found.parameters)
-    errors = before_after_text(found.before, found.after, unit_of)
-    return "\n".join((errors, drops, "", parameters))
+    errors = errors_over({"without it": found.before, "with it": found.after}, unit_of)
+    windows = windows_text(found.fit, found.validation_fit)
+    return "\n".join((errors, windows, drops, "", parameters))
 
 
 def moved_text(rows: Sequence[Moved]) -> str:
-    """Parameters with their standard deviations before and after."""
+    """Parameters with their standard deviations before and after, and what is odd about them."""
     told = [
         (
             public_name(row.name),
             spread(row.before, row.prior_deviation, row.name),
             spread(row.after, row.deviation, row.name),
+            "; ".join(_oddities(row)),
         )
         for row in rows
     ]
-    return columns(("parameter", "before", "after"), told)
+    return columns(("parameter", "before", "after", ""), told)
+
+
+def _oddities(row: Moved) -> list[str]:
+    """Where a parameter ended at a bound, or far from where it was believed to be."""
+    far = f"{number(row.far, 2)} prior deviations away"
+    return ["at its bound"] * row.at_bound + [far] * (row.far > FAR_MOVED)
 
 
 def fit_text(found: FitReport, unit_of: Mapping[str, str]) -> str:
@@ -256,7 +277,8 @@ def fit_text(found: FitReport, unit_of: Mapping[str, str]) -> str:
     ]
     parts = [columns(("parameter", "prior", "fitted", ""), rows), ""]
     parts += correlation_lines([row.name for row in found.rows], found.correlations)
-    parts += ["", before_after_text(found.before, found.after, unit_of)]
+    parts += ["", errors_over({"as it came": found.before, "fitted": found.after}, unit_of)]
+    parts += [windows_text(found.fit, found.validation_fit)]
     return "\n".join(parts + ([] if found.converged else ["warning: the fit did not converge"]))
 
 

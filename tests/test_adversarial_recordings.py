@@ -15,6 +15,7 @@ from test_diagnosis import bench, nothing
 
 from studies import adversarial as spoil
 from studies.demo import DATA
+from studies.documents import comparison_document
 from workbench.comparison import compare
 from workbench.consistency import Finding, Weight, examined, trusted
 from workbench.diagnosis.diagnose import diagnose
@@ -132,11 +133,14 @@ def test_a_sensor_at_rest_is_no_noise(demo):
 
 def test_a_comparison_goes_on_and_says_it(demo):
     rig, train, _ = demo
-    (found,) = compare(
-        rig, [spoil.SERVO_DRIVE["pressures exchanged"](train.part(0, 3000))]
-    ).recordings
+    spoiled = spoil.SERVO_DRIVE["pressures exchanged"](train.part(0, 3000))
+    with pytest.warns(RecordingWarning, match="look exchanged.* fit refuse this recording"):
+        found = compare(rig, [spoiled])
 
-    assert any("look exchanged" in note for note in found.notes)
+    assert any("look exchanged" in note for note in found.recordings[0].notes)
+    (told,) = comparison_document(found)["recordings"][0]["findings"]
+    assert told["weight"] == "refused" and "look exchanged" in told["what"]
+    assert told["channel"] == "chamber_a.pressure and chamber_b.pressure" and told["remedy"]
 
 
 def test_a_fit_refuses_and_warns(demo):

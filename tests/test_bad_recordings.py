@@ -73,6 +73,21 @@ def test_a_unit_that_cannot_be_is_refused(tmp_path, change, message):
         assert message in refused(tmp_path, content, rig=rig)
 
 
+@pytest.mark.parametrize(
+    ("factor", "said"),
+    [
+        (10.0, "look ten times too large or psi; expected another unit than 'bar', or another"),
+        (0.1, "values between 0.2748 and 0.475 look like MPa; expected another unit than 'bar'"),
+        (100.0, "look like kPa"),
+    ],
+)
+def test_pressures_that_are_ten_times_too_large_are_told_so(tmp_path, factor, said):
+    rows = table()
+    rows[:, 2] = factor * (rows[:, 2] - (1.25 if factor < 1 else 0.0))
+
+    assert said in refused(tmp_path, text(rows))
+
+
 def test_gauge_pressures_read_as_absolute_are_refused(tmp_path):
     rows = table()
     rows[:, 2] -= 5.0

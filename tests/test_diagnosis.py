@@ -200,7 +200,11 @@ def test_adding_without_validation_warns_and_improving_refuses(rig):
     with pytest.warns(UserWarning, match="no validation recording"):
         step = add(rig, "coulomb_friction", [bench(1, coulomb)])
     assert step.rig.notes[-1].endswith("in the last third of the training recordings")
-    assert "of the last third of the training recordings" in addition_text(step, {})
+    told = addition_text(step, {})
+    assert "of the last third of the training recordings" in told
+    assert "RMSE without it  with it" in told
+    counts = [len(each.windows) for each in (step.fit, step.validation_fit)]
+    assert f"{counts[0]} in training, {counts[1]} held out" in told
     with pytest.raises(ValueError, match="needs a validation recording"):
         improve(rig, [bench(1, coulomb)], [])
 
@@ -225,7 +229,7 @@ def test_improve_finds_both_of_two_effects_and_stops(rig):
 
     assert found.steps[0].candidate.name == "coulomb_friction"
     assert len(found.steps) == 2
-    assert found.budget[-1][2] < 0.02 * found.budget[0][2]
+    assert found.budget[-1][2] < 0.02 * found.budget[1][2]
     assert values["friction.coulomb_force_n"] == pytest.approx(8.0, rel=0.1)
 
 
@@ -247,7 +251,7 @@ def test_an_interrupt_keeps_the_rounds_that_are_finished(rig):
     found = improve(rig, train, held_out, interrupting("round", 2))
 
     assert found.stopped
-    assert len(found.budget) == 2 and found.budget[1][1] < found.budget[0][1]
+    assert len(found.budget) == 3 and found.budget[2][1] < found.budget[1][1]
     assert [step.candidate.name for step in found.steps] == ["coulomb_friction"]
     assert found.rig.added == ("coulomb_friction",)
 

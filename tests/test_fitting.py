@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from studies.text_of_results import errors_text
+from studies.text_of_results import errors_text, windows_text
 from workbench.fitting.errors import Place, plain_ratio, signal_errors
 from workbench.fitting.gauss_newton import best_of_each, beyond_noise, fit_windows, points_costs
 from workbench.fitting.linearised import Point
@@ -62,6 +62,9 @@ def test_windows_of_the_true_plant_leave_noise_alone(plant, recording):
     fit = refit_starts(windows)
 
     assert fit.chi2 / windows.count == pytest.approx(1.0, abs=0.1)
+    said = windows_text(fit, fit)
+    assert said.startswith(f"errors over windows of 0.2 s, {len(windows)} in training, ")
+    assert "`compare` takes all windows and weighs by sensor noise alone" in said
 
 
 def test_windows_do_not_cross_gaps(plant, recording):

@@ -119,7 +119,7 @@ def test_a_parameter_at_its_bound_is_no_shift():
     assert found.base.plant.values["friction.coulomb_force_n"] == 0.0
     assert "friction.coulomb_force_n" not in [shift.name for shift in shifts(found)]
     (row,) = [r for r in moved_parameters(found.base) if r.name == "friction.coulomb_force_n"]
-    assert np.isnan(row.deviation) and moved_text([row]).endswith("0 N")
+    assert np.isnan(row.deviation) and moved_text([row]).endswith("0 N  at its bound")
 
 
 def test_improve_writes_a_note_for_every_effect_it_added():

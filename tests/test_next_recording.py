@@ -10,7 +10,7 @@ from test_diagnosis import bench, coulomb
 from studies.demo import DATA
 from studies.documents import diagnosis_document
 from studies.export import save_next_recording
-from studies.text_of_results import next_recording_text
+from studies.text_of_next_recording import next_recording_text
 from workbench.comparison.run import read_inputs
 from workbench.diagnosis.diagnose import diagnose
 from workbench.diagnosis.manoeuvre_choice import least_gain
@@ -266,15 +266,15 @@ def test_commands_read_back_as_the_rig_reads_its_files(demo_rig, asked, tmp_path
     assert head.split(",")[:2] == ["time_s", "command_V"]
     assert back.sample_time_s == pytest.approx(first.sample_time_s)
     np.testing.assert_allclose(back[COMMAND], first[COMMAND], rtol=1e-9)
-    for ending in ("pdf", "svg"):
-        assert (tmp_path / f"next_recording.{ending}").stat().st_size > 1000
+    for ending in (".pdf", ".svg", "_how.txt"):
+        assert (tmp_path / f"next_recording{ending}").stat().st_size > 1000
 
 
 def test_text_says_what_to_record_and_what_it_is_expected_to_bring(asked):
     said = next_recording_text(replace(asked, alike=(("one", "other"),)))
 
     assert said.startswith(f"next recording: {asked.what}\nit tells apart constant_force, ")
-    assert "chi2, expected; one and other stay alike" in said
+    assert "of chi2 if nothing more is missing where it goes; one and other stay alike" in said
 
 
 def test_a_bench_that_cannot_be_commanded_gets_advice_in_words():

@@ -79,7 +79,7 @@ def test_both_effects_of_a_pair_are_added_in_one_round_and_asked_for_again(impro
     first, second = improved.steps
 
     assert set(improved.kept) == set(improved.rig.added) == set(PAIR)
-    assert improved.budget[1].label == f"+ {first.candidate.name} + {second.candidate.name}"
+    assert improved.budget[2].label == f"+ {first.candidate.name} + {second.candidate.name}"
     assert [each.candidate.name for each in improved.removals] == list(improved.kept)
     assert all(not r.dropped and r.share_validation > 0.5 for r in improved.removals)
     assert len(improved.rig.notes) == 2 and "together with" in improved.rig.notes[0]

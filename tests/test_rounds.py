@@ -49,7 +49,7 @@ def test_an_effect_that_is_refused_alone_comes_in_with_the_next(rig, singly):
     assert set(found.kept) == {"coulomb_friction", "constant_force"}
     assert found.rig.plant.values["friction.coulomb_force_n"] == pytest.approx(FRICTION_N, rel=0.05)
     assert abs(found.rig.plant.values["constant_force.force_n"]) == pytest.approx(FORCE_N, rel=0.05)
-    assert [stage.label for stage in found.budget[1:]] == [f"+ {' + '.join(found.kept)}"]
+    assert [stage.label for stage in found.budget[2:]] == [f"+ {' + '.join(found.kept)}"]
     assert found.after["validation"]["rod.force"].rmse < 0.25
     assert any("one round further" in message for message in heard)
     assert [each.sentence for each in found.ahead] == [
@@ -76,7 +76,7 @@ def refused_ahead(rig, train, held_out):
     found = improve(rig, [train], [held_out])
 
     assert found.steps == found.kept == () and found.rig is rig
-    assert len(found.diagnoses) == len(found.budget) == 1
+    assert (len(found.diagnoses), len(found.budget)) == (1, 2)
     assert "unexplained" in found.warnings[-1]
     (ahead,) = found.ahead
     assert ahead.after == 1 and ahead.name == "coulomb_friction"

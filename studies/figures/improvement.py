@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
+from math import isfinite
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from studies.figures.style import BLACK, BLUE, COLUMN_IN, ORANGE, PAGE_IN, new_figure, styled
+from studies.figures.style import BLACK, BLUE, COLUMN_IN, GREY, ORANGE, PAGE_IN, new_figure, styled
 from workbench.diagnosis.improvement import Change, Stage
 from workbench.units import display_scale, display_unit, public_name
 
@@ -19,15 +20,19 @@ if TYPE_CHECKING:
     from workbench.fitting.errors import SignalError
 
 WIDE_FROM = 3  # bars that one column holds
+HEADROOM = 0.15  # of the height of the axis, above the highest bar
 LETTER_IN = 0.055  # width of one in a label
+LOOKS = ((GREY, ""), (ORANGE, "////"), (BLUE, ""))  # of the states of a rig, the last one best
 SLANT = {"rotation": 30, "ha": "right", "rotation_mode": "anchor"}
 
 
 def budget_figure(budget: Sequence[Stage]) -> Figure:
     """The falling error as a waterfall: what is left after each step, and what the step took.
 
-    Outlines reach up to the step before (or down, where an effect was dropped).  What the backward
-    and the swap pass did, and empirical terms, stand on a grey ground with a word.
+    The axis is logarithmic, or the last steps could not be seen beside the first, and bars rise
+    from 1, where nothing but sensor noise is left, if none falls so low.  Outlines reach up to the
+    step before (or down, where an effect was dropped).  What the backward and the swap pass did,
+    and empirical terms, stand on a grey ground with a word.
     """
     wide = len(budget) > WIDE_FROM
     with styled():
@@ -55,7 +60,7 @@ def budget_figure(budget: Sequence[Stage]) -> Figure:
             )  # fmt: skip
         _mark(axes, budget)
         axes.grid(False, axis="x")
-        axes.margins(y=0.12)
+        _logarithmic(axes, [value for _, values, *_ in sets for value in values])
         axes.set_ylabel("weighted squared error\nper sample (-)")
         axes.set_title("error after each step")
         filled, outlines = axes.containers[::2], axes.containers[1:2]
@@ -69,10 +74,18 @@ def _broken(label: str) -> str:
     return label.replace("@", "\n@").replace(" for ", "\nfor ").replace(" + ", "\n+ ")
 
 
+def _logarithmic(axes: Axes, values: Sequence[float]) -> None:
+    """A logarithmic axis from 1, or from below the least value, with room for words on top."""
+    sizes = [value for value in values if isfinite(value) and value > 0.0] or [1.0]
+    low, high = min(1.0, 0.5 * min(sizes)), max(*sizes, 2.0)
+    axes.set_yscale("log")
+    axes.set_ylim(low, high * (high / low) ** HEADROOM)
+
+
 def _mark(axes: Axes, budget: Sequence[Stage]) -> None:
     """A grey ground and a word where a step is no plain addition of an effect."""
     for place, stage in enumerate(budget):
-        if stage.change in (Change.START, Change.ADDED):
+        if stage.change in (Change.START, Change.REFITTED, Change.ADDED):
             continue
         axes.axvspan(place - 0.5, place + 0.5, color="0.9", zorder=0)
         axes.text(
@@ -87,25 +100,34 @@ def before_after_figure(
     unit_of: Mapping[str, str],
 ) -> Figure:
     """RMSE over windows of each output before and after, on each set."""
-    outputs = list(next(iter(before.values())))
+    return errors_figure({"before": before, "after": after}, unit_of)
+
+
+def errors_figure(
+    states: Mapping[str, Mapping[str, Mapping[str, SignalError]]], unit_of: Mapping[str, str]
+) -> Figure:
+    """RMSE of each output on each set, in each state of a rig by its words."""
+    first, width = next(iter(states.values())), 0.8 / len(states)
+    outputs = list(next(iter(first.values())))
+    looks = LOOKS[-len(states) :]
     with styled():
         figure = new_figure(PAGE_IN, 2.2)
         panels = figure.subplots(1, len(outputs), squeeze=False)[0]
         for axes, output in zip(panels, outputs, strict=True):
             full = unit_of.get(output, output)
             factor = 1.0 / display_scale(full).factor
-            sets = [label for label in before if output in after.get(label, {})]
+            sets = [
+                label
+                for label in first
+                if all(output in each.get(label, {}) for each in states.values())
+            ]
             places = np.arange(len(sets))
             axes.set_xticks(places, sets)
-            for offset, (label, errors, colour, hatch) in zip(
-                (-0.2, 0.2),
-                (("before", before, ORANGE, "////"), ("after", after, BLUE, "")),
-                strict=True,
-            ):
+            for k, (label, errors) in enumerate(states.items()):
                 values = [factor * errors[name][output].rmse for name in sets]
-                bars = axes.bar(
-                    places + offset, values, 0.38, color=colour, hatch=hatch, label=label
-                )
+                at = places + width * (k - 0.5 * (len(states) - 1))
+                colour, hatch = looks[k]
+                bars = axes.bar(at, values, 0.95 * width, color=colour, hatch=hatch, label=label)
                 axes.bar_label(bars, fmt="%.2g", fontsize=6)
             axes.margins(y=0.15)
             axes.grid(False, axis="x")

@@ -173,7 +173,8 @@ def waterfall(steps: Sequence[Step]) -> list[tuple[str, dict[str, float]]]:
     accepted = [step.accepted for step in steps if step.accepted]
     if not accepted:
         return []
-    bars = [("as it came", _per_sample(accepted[0].before))]
+    begun = "as it came" if accepted[0].name == "fit" else "parameters refitted"
+    bars = [(begun, _per_sample(accepted[0].before))]
     return bars + [
         (f"{k}. {each.name}", _per_sample(each.after)) for k, each in enumerate(accepted, start=1)
     ]

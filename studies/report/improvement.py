@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from studies.figures.diagnosis import diagnosis_figures
-from studies.figures.improvement import before_after_figure, budget_figure
+from studies.figures.improvement import budget_figure, errors_figure
 from studies.figures.style import save_all
-from studies.improvement_text import improvement_text
+from studies.improvement_text import free_states, improvement_text, window_states
 from studies.report.page import FIGURES, Section, write_report
 from studies.text_of_results import (
     addition_text,
@@ -25,10 +25,9 @@ def report_improvement(found: Improvement, folder: Path, command: str) -> Path:
     units = unit_names(found.rig.plant.measured + found.rig.plant.optional_outputs)
     figures = {"error_by_effect": budget_figure(found.budget)} if found.budget else {}
     if found.parameters:
-        figures["before_and_after"] = before_after_figure(found.before, found.after, units)
+        figures["before_and_after"] = errors_figure(window_states(found), units)
         if found.free_before:
-            free = before_after_figure(found.free_before, found.free_after, units)
-            figures["free_runs_before_and_after"] = free
+            figures["free_runs_before_and_after"] = errors_figure(free_states(found), units)
     sections = [Section("The falling error", (), improvement_text(found, units), (*figures,))]
     for number, diagnosis in enumerate(found.diagnoses, start=1):
         drawn = diagnosis_figures(diagnosis, f"{number}_")

@@ -31,7 +31,7 @@ from workbench.comparison.maps import ErrorMap, command_maps, motion_maps
 from workbench.comparison.noise import Noise, recorded_noise
 from workbench.comparison.regimes import equally_weighted, regimes_of, shares
 from workbench.comparison.residuals import Residual, residual_of
-from workbench.consistency import examined
+from workbench.consistency import Finding, warned
 from workbench.fitting.errors import SignalError
 from workbench.fitting.window_length import window_length_s
 from workbench.law_range import warn_beyond
@@ -87,6 +87,8 @@ class RecordingComparison:
         What could not be done, and what of the recording does not fit the rig, in words.
     window_s
         Length of the windows, NaN where there are none.
+    findings
+        What of the recording does not fit the rig; other commands refuse what weighs enough.
     """
 
     name: str
@@ -103,6 +105,7 @@ class RecordingComparison:
     shifts: tuple[ShiftDeviation, ...] = ()
     notes: tuple[str, ...] = ()
     window_s: float = float("nan")
+    findings: tuple[Finding, ...] = ()
 
     @property
     def judged(self) -> str:
@@ -119,13 +122,17 @@ class Comparison:
 
 
 def compare(rig: Rig, recordings: Sequence[Recording]) -> Comparison:
-    """How well the rig's plant tells what was recorded; see the module for the horizons."""
+    """How well the rig's plant tells what was recorded; see the module for the horizons.
+
+    Warns of what of a recording does not fit the rig, and compares it all the same.
+    """
     for recording in recordings:
         warn_beyond(rig, recording)
     return Comparison(rig.name, tuple(_compared(rig, recording) for recording in recordings))
 
 
 def _compared(rig: Rig, recording: Recording) -> RecordingComparison:
+    findings = warned(rig, recording)
     course = course_of(rig.fit_for(recording), recording)
     plant = course.plant
     noise = recorded_noise(recording, plant.measured)
@@ -163,9 +170,10 @@ def _compared(rig: Rig, recording: Recording) -> RecordingComparison:
             *notes,
             *more,
             *filter(None, (each.sentence for each in noise.values())),
-            *map(str, examined(rig, recording)),
+            *map(str, findings),
         ),
         window_s=length_s if WINDOW in simulated else float("nan"),
+        findings=findings,
     )
 
 

@@ -1,6 +1,6 @@
 """Whether a recording can be one of this rig: wrong units, exchanged columns, broken sensors."""
 
-from workbench.consistency.check import checked, examined, trusted
+from workbench.consistency.check import checked, examined, trusted, warned
 from workbench.consistency.findings import Finding, Weight
 
-__all__ = ["Finding", "Weight", "checked", "examined", "trusted"]
+__all__ = ["Finding", "Weight", "checked", "examined", "trusted", "warned"]

@@ -41,6 +41,7 @@ EXPLAINS = 1.3  # unexplained at the most, read in another way: noise fits some 
 AS_GOOD = 1.25  # another misreading that leaves no more than so many times the least is named too
 STILL_MISSED = 0.9  # of every output that a misreading concerns: then it explains nothing
 LEAST = 0.05  # unexplained shares below it count as this
+REFUSING = "diagnose, add, improve and fit refuse this recording"
 
 Set = tuple[Recording, ...]
 
@@ -75,6 +76,15 @@ def checked(rig: Rig, *sets: Sequence[Recording]) -> tuple[Set, ...]:
 def examined(rig: Rig, recording: Recording) -> tuple[Finding, ...]:
     """What does not fit in a recording of this rig; nothing is refused."""
     return tuple(_examined(rig, recording)[1])
+
+
+def warned(rig: Rig, recording: Recording) -> tuple[Finding, ...]:
+    """The same, with a :class:`RecordingWarning` for each: numbers without it would be believed."""
+    findings = examined(rig, recording)
+    for finding in findings:
+        refused = f"; {REFUSING}" if finding.weight is Weight.REFUSED else ""
+        warnings.warn(f"{finding}{refused}", RecordingWarning, stacklevel=3)
+    return findings
 
 
 def _examined(rig: Rig, recording: Recording) -> tuple[Recording, list[Finding]]:

@@ -185,6 +185,7 @@ def _improvement(
         stopped=done.stopped,
         fit=fit,
         validation_fit=held_out,
+        came=done.came,
     )
 
 

@@ -20,6 +20,7 @@ class Change(Enum):
     """What a step of an improvement did."""
 
     START = "as it came"
+    REFITTED = "parameters refitted"
     ADDED = "added"
     DROPPED = "dropped"
     SWAPPED = "swapped"
@@ -66,16 +67,18 @@ class Improvement:
         What the backward and the swap pass found, in order.
     law
         The empirical law that was taken, None without.
-    before, after
-        Errors over windows with free starts on both sets, as the rig came and in the end.
+    came, before, after
+        Errors over windows with free starts on both sets: as the rig came, with its parameters
+        refitted and nothing added, and in the end.
     free_before, free_after
-        The same over free runs; empty for a plant without states, or where the user stopped them.
-        Where positions integrate they
-        are no judge: the right effect can make them worse until the next one is there.
+        The same over free runs, as the rig came and in the end; empty for a plant without states,
+        or where the user stopped them.  Where positions integrate they are no judge: the right
+        effect can make them worse until the next one is there.
     parameters
         Before and after with standard deviations, of all that the final fit moved.
     budget
-        Errors per sample from the bare rig to the final one, step by step.
+        Errors per sample step by step: the rig as it came, its parameters refitted, then each
+        change.
     stopped
         True where the user stopped it after at least one finished round.
     fit, validation_fit
@@ -98,6 +101,7 @@ class Improvement:
     stopped: bool
     fit: Fit = field(repr=False)
     validation_fit: Fit | None = field(repr=False)
+    came: Errors = field(default_factory=dict)
 
     @property
     def warnings(self) -> tuple[str, ...]:

@@ -24,6 +24,7 @@ from workbench.diagnosis.judge import LEAST_BIC
 from workbench.diagnosis.result import NextRecording
 from workbench.diagnosis.rivals import Rehearsed
 from workbench.fitting.gauss_newton import Fit
+from workbench.manoeuvres.conduct import conduct
 from workbench.manoeuvres.limits import Limits
 from workbench.manoeuvres.play import Manoeuvre
 from workbench.manoeuvres.rehearse import rehearse, speed_maps
@@ -89,7 +90,8 @@ def asked_for(
     plants: Plants, limits: Limits, best: Rehearsed, gain: float, alike: Pairs
 ) -> NextRecording:
     """The answer in words and numbers."""
-    windows = next(iter(plants.values())).windows
+    likeliest = next(iter(plants.values()))
+    windows = likeliest.windows
     looped = best.play.looped
     how = "its reference followed by a position loop" if looped else "its commands played"
     length_s = limits.sample_time_s * limits.samples
@@ -106,4 +108,11 @@ def asked_for(
             if looped
         },
         noise=dict(zip(windows.plant.measured, windows.noise.tolist(), strict=True)),
+        conduct=conduct(
+            limits,
+            windows.plant.measured,
+            best.recorded,
+            windows.recordings,
+            speed_maps(likeliest, limits) if looped else (),
+        ),
     )

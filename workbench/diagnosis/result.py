@@ -13,6 +13,7 @@ from workbench.diagnosis.missing_term import Course, Dependence, Intensities, Lo
 from workbench.effect import Kind
 from workbench.fitting.errors import SignalError
 from workbench.fitting.gauss_newton import Fit
+from workbench.manoeuvres.conduct import Conduct
 from workbench.recording import Recording
 
 
@@ -229,6 +230,8 @@ class NextRecording:
         they are.
     noise
         Standard deviation of the sensor noise by output, in SI.
+    conduct
+        Where it starts, the stops that it meets, and the loop; None where nothing can be played.
     """
 
     what: str
@@ -239,6 +242,7 @@ class NextRecording:
     commands: tuple[str, ...] = ()
     reference: Mapping[str, np.ndarray] = field(default_factory=dict, repr=False)
     noise: Mapping[str, float] = field(default_factory=dict)
+    conduct: Conduct | None = field(default=None, repr=False)
 
 
 @dataclass(frozen=True)

@@ -38,9 +38,10 @@ from workbench.diagnosis.passes import Kept, Opened, Passes, Removal, Swap
 from workbench.diagnosis.refit import Refit, refit_from, refit_shaken
 from workbench.diagnosis.result import Diagnosis, Law, Ranked
 from workbench.effect import Kind
-from workbench.fitting.errors import per_sample
+from workbench.fitting.errors import Errors, errors_of, per_sample
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.problem import posed
+from workbench.fitting.start_states import as_it_came
 from workbench.recording import Recording
 from workbench.rig import Rig
 
@@ -53,7 +54,7 @@ class Rounds:
     """How far the work has come.
 
     ``origins`` is the diagnosis by which each effect came in, by its public name; ``opened`` are
-    models without one effect that are fitted already.
+    models without one effect that are fitted already; ``came`` are errors of the rig as it came.
     """
 
     rig: Rig
@@ -68,6 +69,7 @@ class Rounds:
     opened: Opened = field(default_factory=dict, repr=False)
     law: Law | None = None
     stopped: bool = False
+    came: Errors = field(default_factory=dict)
 
     def marked(self, label: str, fit: Fit, held_out: Fit | None, change: Change) -> Rounds:
         """The same with one more bar in the budget."""
@@ -75,12 +77,18 @@ class Rounds:
         return replace(self, budget=(*self.budget, stage))
 
     def told(self, diagnosis: Diagnosis) -> Rounds:
-        """The same with one more diagnosis, the first of which begins the budget."""
+        """The same with one more diagnosis.
+
+        The first begins the budget: the rig as it came, then with its parameters refitted.
+        """
         done = replace(self, diagnoses=(*self.diagnoses, diagnosis))
         if self.budget:
             return done
-        base = (diagnosis.base, diagnosis.base_validation)
-        return done.marked(Change.START.value, *base, Change.START)
+        refitted = (diagnosis.base, diagnosis.base_validation)
+        came = as_it_came(*refitted)
+        done = replace(done, came=errors_of(*came))
+        done = done.marked(Change.START.value, *came, Change.START)
+        return done.marked(Change.REFITTED.value, *refitted, Change.REFITTED)
 
     def looked(self, candidate: Candidate, outcome: str) -> Rounds:
         """The same with what came of trying an effect for one round more."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -12,9 +12,9 @@ from workbench.consistency import checked
 from workbench.fitting.errors import Errors, errors_of
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.posterior import fitted_rig, posterior_covariance
-from workbench.fitting.problem import NO_EVIDENCE, Problem, pose, proves_nothing
+from workbench.fitting.problem import NO_EVIDENCE, pose, proves_nothing
 from workbench.fitting.short_windows import better_from_short_windows
-from workbench.fitting.start_states import refit_starts
+from workbench.fitting.start_states import as_it_came
 from workbench.fitting.unknowns import nominal_unknowns
 from workbench.plant import require
 from workbench.recording import Recording
@@ -55,6 +55,7 @@ class FitReport:
     after: Errors
     converged: bool
     fit: Fit = field(repr=False)
+    validation_fit: Fit | None = field(default=None, repr=False)
 
 
 def fit(
@@ -92,7 +93,7 @@ def fit(
         warnings.warn(NO_EVIDENCE, stacklevel=2)
     progress("fit")
     problem = pose(held, train, validation)
-    before = _untouched(problem)
+    before = errors_of(*as_it_came(problem.base, problem.base_validation))
     progress("the same from short windows, if that leads lower")
     problem = better_from_short_windows(problem, train)
     base = problem.base
@@ -105,15 +106,8 @@ def fit(
         after=errors_of(base, problem.base_validation),
         converged=base.converged,
         fit=base,
+        validation_fit=problem.base_validation,
     )
-
-
-def _untouched(problem: Problem) -> Errors:
-    """Errors of the rig as it came, only start states fitted."""
-    train = refit_starts(problem.base.windows, problem.base.windows.plant.values)
-    held_out = problem.base_validation
-    values: Mapping[str, float] = problem.base.windows.plant.values
-    return errors_of(train, refit_starts(held_out.windows, values) if held_out else None)
 
 
 def _correlations(covariance: np.ndarray) -> np.ndarray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import inf, isnan, nan
 
 import numpy as np
 
@@ -27,6 +28,18 @@ class Moved:
     after: float
     deviation: float
     prior_deviation: float
+
+    @property
+    def at_bound(self) -> bool:
+        """True for what the fit holds at the end of its range."""
+        return isnan(self.deviation)
+
+    @property
+    def far(self) -> float:
+        """How many prior standard deviations it moved, NaN for what had no prior."""
+        if not 0.0 < self.prior_deviation < inf:
+            return nan
+        return abs(self.after - self.before) / self.prior_deviation
 
 
 def posterior_deviation(fit: Fit) -> np.ndarray:

@@ -35,6 +35,19 @@ def refit_starts(
     return fit_windows(windows, nothing, start, iterations, at)
 
 
+def as_it_came(base: Fit, held_out: Fit | None) -> tuple[Fit, Fit | None]:
+    """A plant before a fit moved its parameters, on the windows of that fit and of its validation.
+
+    Only start states are fitted, with the weights of the fit; they may begin where the fit has
+    them, so that the plant as it came is not worse for a start that was not found.
+    """
+    came = refit_starts(base.windows, base.windows.plant.values, others=[base.point.starts])
+    if held_out is None:
+        return came, None
+    values, starts = base.windows.plant.values, [held_out.point.starts]
+    return came, refit_starts(held_out.windows, values, others=starts)
+
+
 def _same_states(near: Fit, windows: Windows) -> bool:
     return list(near.windows.plant.state_list) == list(windows.plant.state_list)
 

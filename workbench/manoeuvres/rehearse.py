@@ -105,6 +105,11 @@ def _speeds(moved: np.ndarray, axis: Axis, sample_time_s: float) -> np.ndarray:
     return (moved[rows, last] - moved[rows, half]) / ((last - half) * sample_time_s)
 
 
+def bandwidth_rad_s(limits: Limits) -> float:
+    """The loop's bandwidth w: less where its updates are far apart."""
+    return min(BANDWIDTH_RAD_S, PER_UPDATE / (BLOCK * limits.sample_time_s))
+
+
 def _loop(
     limits: Limits, axis: Axis, speeds: SpeedMap, reference: np.ndarray, y: np.ndarray, first: int
 ) -> np.ndarray:
@@ -113,7 +118,7 @@ def _loop(
     later = min(first + BLOCK, reference.shape[1] - 1)
     rate = (reference[:, later] - reference[:, first]) / step_s
     error = reference[:, first] - y
-    wanted = rate + min(BANDWIDTH_RAD_S, PER_UPDATE / step_s) * error
+    wanted = rate + bandwidth_rad_s(limits) * error
     given = speeds.command_for(np.clip(wanted, -axis.speed, axis.speed))
     range_ = axis.high - axis.low
     rests = (np.abs(error) < REST * range_) & (np.abs(rate) < 1e-6 * range_ / step_s)

@@ -12,7 +12,7 @@ from workbench.fitting.unknowns import nominal_unknowns
 from workbench.plant import Plant
 from workbench.reading.table import RecordingWarning
 from workbench.recording import Recording
-from workbench.rig import Rig
+from workbench.rig import AMBIENT, Rig
 from workbench.units import display_unit, public_name, scale, si_unit, suffix
 
 LIMITS = {
@@ -36,6 +36,8 @@ USUAL = {
 }
 LEAST_GAUGE_PA = 1e3  # a gauge pressure that never gets this far is no recording of a pressure
 VACUUM_PA = 1e3  # an absolute pressure below this is one that counts from ambient
+SUPPLY = "supply.pressure_pa"
+ROOM = 0.25  # a chamber goes that far below ambient and above supply, as shares of each
 BEYOND = 1.5  # of the range of a command: more cannot be that command
 RUN = 50  # equal values in a row that make a sensor suspect, where it usually changes
 LIVELY = 0.2  # share of unchanged samples below which a channel usually changes
@@ -56,8 +58,12 @@ def cannot_be(
         least, size = LEAST_GAUGE_PA, float(np.nanmax(np.abs(raw))) * scale(unit, name).factor
     if not least <= size <= most:
         seen = f"values between {np.nanmin(raw):.4g} and {np.nanmax(raw):.4g}"
-        other = _looks_like(name, raw, unit)
-        hint = f" look like {other}" if other else " cannot be"
+        others, tenfold = _looks_like(name, raw, unit), _ten_times(name, si, plant)
+        if tenfold and not _is_ten_times(others, unit, name):
+            look = " or ".join((f"ten times {tenfold}", *others))
+            expected = f"another unit than '{unit}', or another gain of the sensor"
+            return Message(f"{seen} look {look}", kind, expected, file=file)
+        hint = f" look like {' or '.join(others)}" if others else " cannot be"
         return Message(seen + hint, kind, f"another unit than '{unit}'", file=file)
     if si_unit(name) == "Pa" and low < VACUUM_PA:
         what = f"an absolute pressure of {low / 1e5:.3g} bar cannot be"
@@ -65,12 +71,31 @@ def cannot_be(
     return None
 
 
-def _looks_like(name: str, raw: np.ndarray, unit: str) -> str:
+def _ten_times(name: str, si: np.ndarray, plant: Plant) -> str:
+    """Whether a pressure is ``too large`` or ``too small`` by ten for this supply and ambient."""
+    if si_unit(name) != "Pa" or not {SUPPLY, AMBIENT} <= plant.values.keys():
+        return ""
+    lowest_pa = (1.0 - ROOM) * plant.values[AMBIENT]
+    highest_pa = (1.0 + ROOM) * plant.values[SUPPLY]
+    for factor, words in ((0.1, "too large"), (10.0, "too small")):
+        low_pa, high_pa = factor * np.nanmin(si), factor * np.nanmax(si)
+        if lowest_pa <= low_pa and high_pa <= highest_pa:
+            return words
+    return ""
+
+
+def _is_ten_times(others: Sequence[str], unit: str, name: str) -> bool:
+    """Whether one of the other units is ten times this one, which then says it all."""
+    ratios = [scale(other, name).factor / scale(unit, name).factor for other in others]
+    return bool(np.isclose(ratios, 10.0).any() or np.isclose(ratios, 0.1).any())
+
+
+def _looks_like(name: str, raw: np.ndarray, unit: str) -> list[str]:
     """The usual units in which these values would be ordinary."""
     smallest, largest, units = USUAL.get(suffix(name), (0.0, 0.0, ()))
     size = float(np.nanmax(np.abs(raw)))
     others = (other for other in units if other != unit)
-    return " or ".join(u for u in others if smallest <= abs(scale(u, name).to_si(size)) <= largest)
+    return [u for u in others if smallest <= abs(scale(u, name).to_si(size)) <= largest]
 
 
 def warn_of_sensors(channels: Mapping[str, np.ndarray], outputs: set[str], file: str) -> None:

@@ -1,0 +1,48 @@
+"""The falling error as a figure: every step can be seen, and no label runs into another."""
+
+from itertools import pairwise
+
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+from studies.figures.improvement import budget_figure
+from studies.figures.style import styled
+from workbench.diagnosis.improvement import Stage
+
+
+def test_the_last_steps_of_a_budget_can_be_seen_beside_the_first():
+    stages = [Stage(f"step {k}", size, size) for k, size in enumerate((1.7e4, 2600.0, 106.0, 20.6))]
+    (axes,) = budget_figure(stages).axes
+    low, high = (axes.transAxes.inverted().transform(axes.transData.transform((0, size)))[1]
+                 for size in (20.6, 106.0))  # fmt: skip
+
+    assert axes.get_ylim()[0] == 1.0 and axes.get_ylim()[1] > 1.7e4
+    assert high - low > 0.1
+
+
+@pytest.mark.parametrize(
+    ("labels", "degrees"),
+    [
+        (["+ valve_lag", "+ spring_force"], 0.0),
+        (["+ sensor_offset@chamber_a.pressure + spring_force", "+ valve_dead_zone"], 30.0),
+        (["+ sensor_offset@chamber_a.pressure"] * 3, 0.0),
+        (["sensor_scale@chamber_b.pressure for valve_lag"] * 7, 30.0),
+    ],
+)
+def test_labels_of_the_budget_keep_off_each_other(labels, degrees):
+    figure = budget_figure([Stage(label, 2.0, 3.0) for label in ("as it came", *labels)])
+    with styled():
+        FigureCanvasAgg(figure).draw()
+    words = figure.axes[0].get_xticklabels()
+    boxes = [each.get_window_extent() for each in words]
+
+    assert {each.get_rotation() for each in words} == {degrees}
+    assert degrees or not any(one.overlaps(other) for one, other in pairwise(boxes))
+
+
+def test_the_two_of_a_pair_stand_on_lines_of_their_own():
+    pair = Stage("+ sensor_offset@chamber_a.pressure + spring_force", 2.0, 3.0)
+    (axes,) = budget_figure([Stage("as it came", 4.0, 5.0), pair]).axes
+
+    lines = axes.get_xticklabels()[1].get_text().splitlines()
+    assert lines == ["+ sensor_offset", "@chamber_a.pressure", "+ spring_force"]

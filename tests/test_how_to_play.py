@@ -1,0 +1,89 @@
+"""How the next recording is played: where it starts, what it runs into, and in which loop."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from conftest import PLANT_MODELS
+
+from studies.documents import plain
+from studies.text_of_next_recording import conduct_document, conduct_lines, instructions
+from workbench.diagnosis.result import NextRecording
+from workbench.manoeuvres.conduct import conduct
+from workbench.manoeuvres.limits import limits_of
+from workbench.manoeuvres.rehearse import BANDWIDTH_RAD_S, SpeedMap
+from workbench.recording import Recording
+
+PLACE, A = "slide.position_m", "chamber_a.pressure_pa"
+DRIVE, TANK = PLANT_MODELS["servo_drive"], PLANT_MODELS["servo_reservoir"]
+LOW_M, HIGH_M = 0.0, 0.290
+
+
+def going(*places_m, sample_time_s=1e-3):
+    """A slide that goes from place to place at one speed, a second each."""
+    at_s = np.arange(len(places_m))
+    time_s = np.arange(0.0, at_s[-1], sample_time_s)
+    rows = {PLACE: np.interp(time_s, at_s, places_m)}
+    return Recording("made up", sample_time_s, constants(DRIVE, len(time_s)) | rows)
+
+
+def constants(plant, n):
+    names = (*plant.commands, *plant.measured_inputs)
+    rows = {signal.name: np.full(n, signal.nominal) for signal in names}
+    return rows | {name: np.full(n, 5e5) for name in plant.measured}
+
+
+@pytest.fixture(scope="module")
+def known():
+    recorded = [going(0.06, 0.12), going(0.07, 0.20)]
+    limits = limits_of(DRIVE, recorded)
+    (axis,) = limits.axes
+    assert axis.stops == (LOW_M, HIGH_M)
+    predicted = [going(0.145, LOW_M, LOW_M, HIGH_M), going(0.145, LOW_M, LOW_M, 0.2)]
+    speeds = SpeedMap(np.array([-0.5, 0.0, 0.5]), np.array([4.0, 4.95, 6.0]))
+    return conduct(limits, DRIVE.measured, predicted, recorded, [speeds])
+
+
+def test_it_starts_where_predictions_do_and_meets_stops_as_fast_as_any_rival(known):
+    assert (known.starts[PLACE].at, known.starts[PLACE].recorded) == (0.145, (0.06, 0.07))
+    assert [each.at for each in known.contacts] == [LOW_M, HIGH_M]
+    assert known.contacts[0].speed == pytest.approx(0.145, rel=1e-6)
+    assert known.contacts[1].speed == pytest.approx(0.290, rel=1e-6)
+    assert known.loop.bandwidth_rad_s == BANDWIDTH_RAD_S
+
+
+def test_start_stops_and_loop_are_told(known):
+    asked = NextRecording("go", ("one", "other"), 9.0, commands=("valve.command_v",), conduct=known)
+    start, stops, loop = conduct_lines(asked)
+
+    assert start == "it starts with slide.position at 145 mm (recordings start at 60 mm, 70 mm)"
+    assert "slide.position 0 mm at up to 0.15 m/s and slide.position 290 mm at up to 0.29" in stops
+    assert "dr/dt + w (r - y), w = 6 rad/s" in loop and "drift" in loop
+    table = instructions(asked).splitlines()[-4:]
+    assert table[0].split("  ")[0] == "valve.command (V)"
+    assert [line.split() for line in table[1:]] == [["4", "-0.5"], ["4.95", "0"], ["6", "0.5"]]
+    assert conduct_lines(replace(asked, conduct=None)) == []
+
+
+def test_how_it_is_played_stands_in_the_document_in_si(known):
+    told = json.loads(json.dumps(conduct_document(known), allow_nan=False))
+
+    assert told["starts"]["slide.position"] == {
+        "at": 0.145,
+        "recordings": [0.06, 0.07],
+        "unit": "m",
+    }
+    assert [each["speed_unit"] for each in told["contacts"]] == ["m/s", "m/s"]
+    assert told["loop"]["bandwidth_rad_s"] == plain(BANDWIDTH_RAD_S)
+    assert told["loop"]["speed_maps"]["slide.position"]["command"] == [4.0, 4.95, 6.0]
+
+
+def test_commands_that_move_no_position_have_starts_of_all_outputs_and_no_loop():
+    recorded = Recording("made up", 1e-3, constants(TANK, 2000))
+    known = conduct(limits_of(TANK, [recorded]), TANK.measured, [recorded], [recorded])
+
+    assert list(known.starts) == list(TANK.measured)
+    assert (known.contacts, known.loop) == ((), None)
+    told = conduct_lines(NextRecording("go", ("one", "other"), 9.0, conduct=known))
+    assert told == ["it starts with reservoir.pressure at 5 bar"]
