@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
+from studies.shift_cases import case_deviations
 from workbench.diagnosis.result import told
 from workbench.units import public_name, si_unit
 
@@ -23,12 +24,25 @@ Document = dict[str, Any]
 
 
 def comparison_document(found: Comparison) -> Document:
-    """A comparison: errors by horizon and signal, regimes, worst windows, gear shifts."""
+    """A comparison: errors by horizon and signal, regimes, worst windows, gear shifts.
+
+    ``shift_cases`` holds the shifts of all recordings by case, as Table I of paper 003.
+    """
+    shifts = [shift for each in found.recordings for shift in each.shifts]
     return {
         "schema": "workbench.comparison/1",
         "rig": found.rig_name,
         "recordings": [_compared(each) for each in found.recordings],
+        "shift_cases": [
+            {"case": e.case, "shifts": e.shifts, "deviation": _deviations(e.deviations)}
+            for e in case_deviations(shifts)
+        ],
     }
+
+
+def _deviations(found: Mapping[str, float]) -> Document:
+    """Deviation measure by public output name."""
+    return {public_name(name): plain(share) for name, share in found.items()}
 
 
 def _compared(each: RecordingComparison) -> Document:
@@ -65,7 +79,7 @@ def _compared(each: RecordingComparison) -> Document:
                 "case": shift.case,
                 "start_s": plain(shift.start_s),
                 "end_s": plain(shift.end_s),
-                "deviation": {public_name(n): plain(e) for n, e in shift.deviations.items()},
+                "deviation": _deviations(shift.deviations),
             }
             for shift in each.shifts
         ],

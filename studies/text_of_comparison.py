@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import nan
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from studies.shift_cases import case_deviations, mean_deviations
 from studies.text import columns, number, percent, shown
 from workbench.units import public_name
 
@@ -18,8 +20,13 @@ SHOWN_REGIMES = 20
 
 
 def comparison_text(found: Comparison) -> str:
-    """Errors by horizon, regimes, worst windows and gear shifts of each recording."""
-    return "\n\n".join(_recording_text(each) for each in found.recordings)
+    """Errors by horizon, regimes, worst windows and gear shifts of each recording.
+
+    In the end the gear shifts of all of them by case, as paper 003 prints them.
+    """
+    shifts = [shift for each in found.recordings for shift in each.shifts]
+    parts = (*map(_recording_text, found.recordings), cases_text(shifts))
+    return "\n\n".join(filter(None, parts))
 
 
 def _recording_text(each: RecordingComparison) -> str:
@@ -67,7 +74,7 @@ def _regimes(found: Sequence[Regime]) -> str:
 
 
 def shifts_text(found: Sequence[ShiftDeviation]) -> str:
-    """Table I of paper 003: deviation of each output for each shift, and the mean."""
+    """Deviation of each output for each shift, and the mean."""
     if not found:
         return ""
     outputs = list(found[0].deviations)
@@ -80,12 +87,21 @@ def shifts_text(found: Sequence[ShiftDeviation]) -> str:
         )
         for shift in found
     ]
-    means = [_mean([shift.deviations[name] for shift in found]) for name in outputs]
-    rows.append(("mean", "-", "-", *(percent(mean, 2) for mean in means)))
+    means = mean_deviations(found)
+    rows.append(("mean", "-", "-", *(percent(means[name], 2) for name in outputs)))
     head = ("deviation of the shift", "from", "takes", *map(public_name, outputs))
     return columns(head, rows)
 
 
-def _mean(values: Sequence[float]) -> float:
-    known = [value for value in values if np.isfinite(value)]
-    return sum(known) / len(known) if known else float("nan")
+def cases_text(found: Sequence[ShiftDeviation]) -> str:
+    """Table I of paper 003: mean deviation of each output by case, and the mean of the cases."""
+    cases = case_deviations(found)
+    if not cases:
+        return ""
+    means = mean_deviations(cases)
+    rows = [
+        (each.case, str(each.shifts), *(percent(each.deviations.get(n, nan), 2) for n in means))
+        for each in cases
+    ]
+    rows.append(("mean of the cases", str(len(found)), *(percent(e, 2) for e in means.values())))
+    return columns(("mean deviation by case", "shifts", *map(public_name, means)), rows)
