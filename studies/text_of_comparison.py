@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import nan
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 import numpy as np
 
 from studies.shift_cases import case_deviations, mean_deviations
 from studies.text import columns, number, percent, shown
+from workbench.comparison.gear_shift import PHASES
 from workbench.units import public_name
 
 if TYPE_CHECKING:
@@ -17,6 +18,18 @@ if TYPE_CHECKING:
     from workbench.comparison.deviation import ShiftDeviation
 
 SHOWN_REGIMES = 20
+OVERLAP = "regimes overlap: each share is of all samples in it, so rows need not sum to 100 %"
+
+
+class Named(Protocol):
+    """Anything of a regime, by its name."""
+
+    @property
+    def name(self) -> str:
+        """Name of the regime."""
+
+
+Row = TypeVar("Row", bound=Named)
 
 
 def comparison_text(found: Comparison) -> str:
@@ -65,12 +78,20 @@ def _errors(each: RecordingComparison) -> str:
     )
 
 
+def shown_regimes(found: Sequence[Row], most: int = SHOWN_REGIMES) -> list[Row]:
+    """The first ``most`` regimes, and every phase of a gear shift, in the order they come."""
+    return [each for k, each in enumerate(found) if k < most or each.name in PHASES]
+
+
 def _regimes(found: Sequence[Regime]) -> str:
-    rows = [(r.name, percent(r.share_of_error), percent(r.share_of_time)) for r in found]
-    rest = len(rows) - SHOWN_REGIMES
-    more = f"\n... and {rest} more, in the JSON" if rest > 0 else ""
+    kept = shown_regimes(found)
+    if not kept:
+        return ""
+    rows = [(r.name, percent(r.share_of_error), percent(r.share_of_time)) for r in kept]
+    rest = len(found) - len(kept)
+    more = [f"... and {rest} more, in the JSON"] if rest > 0 else []
     head = ("where the error is", "of the error", "of the time")
-    return columns(head, rows[:SHOWN_REGIMES]) + more
+    return "\n".join([columns(head, rows), *more, OVERLAP])
 
 
 def shifts_text(found: Sequence[ShiftDeviation]) -> str:
