@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from workbench.comparison.compare import Comparison, RecordingComparison
     from workbench.diagnosis.result import Diagnosis, Law, NextRecording, Ranked, Where
     from workbench.fitting.errors import SignalError
-    from workbench.identification.result import Estimate, Identified, Procedure
     from workbench.plant import Candidate
 
 Document = dict[str, Any]
@@ -266,33 +265,4 @@ def _next_recording(asked: NextRecording | None) -> Document | None:
         "separates": list(asked.separates),
         "expected_gain": plain(asked.expected_gain),
         "alike": [list(pair) for pair in asked.alike],
-    }
-
-
-def identification_document(procedure: Procedure, found: Identified) -> Document:
-    """What an identification procedure found, in SI; parameters are those of the rig."""
-    printed = procedure.printed
-
-    def told(estimates: tuple[Estimate, ...]) -> Document:
-        return {
-            public_name(each.name): {
-                "value": plain(each.value),
-                "unit": si_unit(each.name),
-                "std": plain(each.deviation),
-                **({"paper": plain(printed[each.name])} if each.name in printed else {}),
-            }
-            for each in estimates
-        }
-
-    return {
-        "schema": "workbench.identification/1",
-        "procedure": procedure.name,
-        "source": procedure.source,
-        "rig": found.rig.name,
-        "estimates": told(found.estimates),
-        "parameters": told(found.parameters),
-        "curves": [
-            {"curve": curve.label, "mean_absolute_error": plain(curve.mean_absolute_error)}
-            for curve in found.curves
-        ],
     }
