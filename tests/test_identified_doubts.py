@@ -99,3 +99,11 @@ def test_the_volume_of_another_tank_is_doubted(release, tmp_path):
     assert answer.exit_code == 0
     assert "prior deviations from the rig's 20 cm^3" in answer.stdout
     assert json.loads((tmp_path / "x.json").read_text())["warnings"]
+
+
+def test_a_column_that_the_rig_does_not_map_is_named(release):
+    answer = call("identify", "dead-volume", release / "drive.toml", release / "release.csv")
+
+    assert answer.exit_code == 2
+    assert "the rig maps no column to supply.pressure" in answer.stderr
+    assert "supply_bar" in answer.stderr
