@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
+from studies.shift_cases import case_deviations
 from studies.text_of_next_recording import conduct_document
 from workbench.diagnosis.result import told
 from workbench.units import public_name, si_unit
@@ -17,19 +18,31 @@ if TYPE_CHECKING:
     from workbench.comparison.compare import Comparison, RecordingComparison
     from workbench.diagnosis.result import Diagnosis, Law, NextRecording, Ranked, Where
     from workbench.fitting.errors import SignalError
-    from workbench.identification.result import Estimate, Identified, Procedure
     from workbench.plant import Candidate
 
 Document = dict[str, Any]
 
 
 def comparison_document(found: Comparison) -> Document:
-    """A comparison: errors by horizon and signal, regimes, worst windows, gear shifts."""
+    """A comparison: errors by horizon and signal, regimes, worst windows, gear shifts.
+
+    ``shift_cases`` holds the shifts of all recordings by case, as Table I of paper 003.
+    """
+    shifts = [shift for each in found.recordings for shift in each.shifts]
     return {
         "schema": "workbench.comparison/1",
         "rig": found.rig_name,
         "recordings": [_compared(each) for each in found.recordings],
+        "shift_cases": [
+            {"case": e.case, "shifts": e.shifts, "deviation": _deviations(e.deviations)}
+            for e in case_deviations(shifts)
+        ],
     }
+
+
+def _deviations(found: Mapping[str, float]) -> Document:
+    """Deviation measure by public output name."""
+    return {public_name(name): plain(share) for name, share in found.items()}
 
 
 def _compared(each: RecordingComparison) -> Document:
@@ -66,7 +79,7 @@ def _compared(each: RecordingComparison) -> Document:
                 "case": shift.case,
                 "start_s": plain(shift.start_s),
                 "end_s": plain(shift.end_s),
-                "deviation": {public_name(n): plain(e) for n, e in shift.deviations.items()},
+                "deviation": _deviations(shift.deviations),
             }
             for shift in each.shifts
         ],
@@ -257,33 +270,4 @@ def _next_recording(asked: NextRecording | None) -> Document | None:
         "expected_gain": plain(asked.expected_gain),
         "alike": [list(pair) for pair in asked.alike],
         "conduct": conduct_document(asked.conduct) if asked.conduct else None,
-    }
-
-
-def identification_document(procedure: Procedure, found: Identified) -> Document:
-    """What an identification procedure found, in SI; parameters are those of the rig."""
-    printed = procedure.printed
-
-    def told(estimates: tuple[Estimate, ...]) -> Document:
-        return {
-            public_name(each.name): {
-                "value": plain(each.value),
-                "unit": si_unit(each.name),
-                "std": plain(each.deviation),
-                **({"paper": plain(printed[each.name])} if each.name in printed else {}),
-            }
-            for each in estimates
-        }
-
-    return {
-        "schema": "workbench.identification/1",
-        "procedure": procedure.name,
-        "source": procedure.source,
-        "rig": found.rig.name,
-        "estimates": told(found.estimates),
-        "parameters": told(found.parameters),
-        "curves": [
-            {"curve": curve.label, "mean_absolute_error": plain(curve.mean_absolute_error)}
-            for curve in found.curves
-        ],
     }

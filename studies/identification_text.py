@@ -1,4 +1,4 @@
-"""Identification procedures and what they found, as text."""
+"""Identification procedures and what they found, as text and as JSON."""
 
 from __future__ import annotations
 
@@ -7,13 +7,15 @@ from functools import partial
 from math import isfinite, nan
 from textwrap import fill
 
+from studies.documents import Document, plain
 from studies.text import columns, shown
 from workbench.errors import InputError, Message, listed, nearest
 from workbench.identification import PROCEDURES
 from workbench.identification.dead_volume import PROCEDURE as DEAD_VOLUME
 from workbench.identification.result import Estimate, Identified, Procedure
-from workbench.identification.tank_curves import FlowFit
-from workbench.units import UnitError, public_name, quantity
+from workbench.identification.standing import standing
+from workbench.identification.tank_curves import FlowFit, TankCurve
+from workbench.units import UnitError, public_name, quantity, si_unit
 
 WIDTH = 100  # of a guide, in characters
 
@@ -72,37 +74,110 @@ def known_procedure(name: str, tank: str | None = None) -> Procedure:
 
 
 def identified_text(procedure: Procedure, found: Identified) -> str:
-    """What was identified with standard deviations, what the rig had, and what the paper prints."""
+    """What was identified with standard deviations, what the rig had, and what the paper prints.
+
+    Warnings of what stands far off or at the end of its range come last.
+    """
     own, fixed = found.rig.plant.values, found.rig.fixed
     rows = [_row(each, "-", procedure) for each in found.estimates]
     for each in found.parameters:
         stays = ", fixed" if each.name in fixed else ""
-        rows.append(_row(each, shown(own[each.name], each.name) + stays, procedure))
-    text = columns(("identified", "value", "deviation", "rig had", "paper 002"), rows)
+        remark = "at a bound" if standing(found.rig, each).at_bound else ""
+        had = shown(own[each.name], each.name) + stays
+        rows.append(_row(each, had, procedure, remark))
+    text = columns(("identified", "value", "deviation", "rig had", "paper 002", ""), rows)
+    warnings = "".join(f"\nwarning: {said}" for said in doubts(procedure, found))
     if isinstance(found, FlowFit):
-        return f"{flow_text(found)}\n\n{text}"
+        return f"{flow_text(found)}\n\n{text}{warnings}"
     errors = ", ".join(
         f"{curve.label} {shown(curve.mean_absolute_error, _measured(found))}"
         for curve in found.curves
     )
-    return f"{text}\n\nmean absolute error: {errors}"
+    return f"{text}\n\nmean absolute error: {errors}{warnings}"
+
+
+def doubts(procedure: Procedure, found: Identified) -> list[str]:
+    """A sentence for each parameter far from the rig's value or at the end of its range."""
+    said, own = [], found.rig.plant.values
+    also = ", and --tank the volume of its tank" if procedure.name == DEAD_VOLUME.name else ""
+    for each in found.parameters:
+        name, value = public_name(each.name), shown(each.value, each.name)
+        stands = standing(found.rig, each)
+        if stands.at_bound:
+            end = shown(stands.end, each.name)
+            said.append(f"{name} {value} is no result: its range ends at {end}")
+        if stands.far:
+            said.append(
+                f"{name} {value} lies {stands.deviations_off:.3g} prior deviations from the "
+                f"rig's {shown(own[each.name], each.name)}: is the recording of this rig{also}?"
+            )
+    ended = [curve for curve in found.curves if curve.at_bound]
+    if ended:
+        many = f"{len(ended)} of {len(found.curves)} curves"
+        said.append(f"{many} have values at the end of their range, which are no results")
+    return said
+
+
+def identification_document(procedure: Procedure, found: Identified) -> Document:
+    """What an identification procedure found, in SI; parameters are those of the rig."""
+    own = {each.name: standing(found.rig, each) for each in found.parameters}
+    return {
+        "schema": "workbench.identification/1",
+        "procedure": procedure.name,
+        "source": procedure.source,
+        "rig": found.rig.name,
+        "estimates": {public_name(e.name): _document(procedure, e) for e in found.estimates},
+        "parameters": {
+            public_name(each.name): {
+                **_document(procedure, each),
+                "prior_deviations_off": plain(own[each.name].deviations_off),
+                "at_bound": own[each.name].at_bound,
+            }
+            for each in found.parameters
+        },
+        "curves": [
+            {
+                "curve": curve.label,
+                "mean_absolute_error": plain(curve.mean_absolute_error),
+                "at_bound": list(curve.at_bound),
+            }
+            for curve in found.curves
+        ],
+        "warnings": doubts(procedure, found),
+    }
+
+
+def _document(procedure: Procedure, each: Estimate) -> Document:
+    printed = procedure.printed.get(each.name)
+    return {
+        "value": plain(each.value),
+        "unit": si_unit(each.name),
+        "std": plain(each.deviation),
+        **({} if printed is None else {"paper": plain(printed)}),
+    }
 
 
 def flow_text(found: FlowFit) -> str:
     """One line per curve: area, b, a, m, and MAE of the curve's own fit and of the rig."""
     rows = []
     for curve, error_pa in zip(found.curves, found.rig_errors_pa, strict=True):
-        shape = (curve.critical_ratio, curve.cracking_ratio, curve.subsonic_index)
         rows.append(
             (
                 curve.label,
                 shown(curve.area_m2.value, "area_m2"),
-                *(f"{each.value:.3f} +- {each.deviation:.3f}" for each in shape),
+                *(f"{e.value:.3f} +- {e.deviation:.3f}" for e in curve.shape.values()),
                 shown(curve.mean_absolute_error, "error_pa", 2),
                 shown(error_pa, "error_pa", 2),
+                _ended(curve),
             )
         )
-    return columns(("curve", "C_d A", "b", "a", "m", "MAE", "MAE, rig"), rows)
+    return columns(("curve", "C_d A", "b", "a", "m", "MAE", "MAE, rig", ""), rows)
+
+
+def _ended(curve: TankCurve) -> str:
+    """Which of b, a and m ended at the end of its range."""
+    ended = [word for word, each in curve.shape.items() if each.name in curve.at_bound]
+    return f"{', '.join(ended)} at a bound" if ended else ""
 
 
 def _measured(found: Identified) -> str:
@@ -110,7 +185,7 @@ def _measured(found: Identified) -> str:
     return "error_n" if hasattr(found, "break_aways") else "error_pa"
 
 
-def _row(each: Estimate, had: str, procedure: Procedure) -> tuple[str, ...]:
+def _row(each: Estimate, had: str, procedure: Procedure, remark: str = "") -> tuple[str, ...]:
     spread = shown(each.deviation, each.name, 2) if isfinite(each.deviation) else "-"
     printed = shown(procedure.printed.get(each.name, nan), each.name)
-    return public_name(each.name), shown(each.value, each.name), spread, had, printed
+    return public_name(each.name), shown(each.value, each.name), spread, had, printed, remark

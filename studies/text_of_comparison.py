@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from math import nan
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 import numpy as np
 
+from studies.shift_cases import case_deviations, mean_deviations
 from studies.text import columns, number, percent, shown
+from workbench.comparison.gear_shift import PHASES
 from workbench.units import public_name
 
 if TYPE_CHECKING:
@@ -15,11 +18,28 @@ if TYPE_CHECKING:
     from workbench.comparison.deviation import ShiftDeviation
 
 SHOWN_REGIMES = 20
+OVERLAP = "regimes overlap: each share is of all samples in it, so rows need not sum to 100 %"
+
+
+class Named(Protocol):
+    """Anything of a regime, by its name."""
+
+    @property
+    def name(self) -> str:
+        """Name of the regime."""
+
+
+Row = TypeVar("Row", bound=Named)
 
 
 def comparison_text(found: Comparison) -> str:
-    """Errors by horizon, regimes, worst windows and gear shifts of each recording."""
-    return "\n\n".join(_recording_text(each) for each in found.recordings)
+    """Errors by horizon, regimes, worst windows and gear shifts of each recording.
+
+    In the end the gear shifts of all of them by case, as paper 003 prints them.
+    """
+    shifts = [shift for each in found.recordings for shift in each.shifts]
+    parts = (*map(_recording_text, found.recordings), cases_text(shifts))
+    return "\n\n".join(filter(None, parts))
 
 
 def _recording_text(each: RecordingComparison) -> str:
@@ -58,16 +78,24 @@ def _errors(each: RecordingComparison) -> str:
     )
 
 
+def shown_regimes(found: Sequence[Row], most: int = SHOWN_REGIMES) -> list[Row]:
+    """The first ``most`` regimes, and every phase of a gear shift, in the order they come."""
+    return [each for k, each in enumerate(found) if k < most or each.name in PHASES]
+
+
 def _regimes(found: Sequence[Regime]) -> str:
-    rows = [(r.name, percent(r.share_of_error), percent(r.share_of_time)) for r in found]
-    rest = len(rows) - SHOWN_REGIMES
-    more = f"\n... and {rest} more, in the JSON" if rest > 0 else ""
+    kept = shown_regimes(found)
+    if not kept:
+        return ""
+    rows = [(r.name, percent(r.share_of_error), percent(r.share_of_time)) for r in kept]
+    rest = len(found) - len(kept)
+    more = [f"... and {rest} more, in the JSON"] if rest > 0 else []
     head = ("where the error is", "of the error", "of the time")
-    return columns(head, rows[:SHOWN_REGIMES]) + more
+    return "\n".join([columns(head, rows), *more, OVERLAP])
 
 
 def shifts_text(found: Sequence[ShiftDeviation]) -> str:
-    """Table I of paper 003: deviation of each output for each shift, and the mean."""
+    """Deviation of each output for each shift, and the mean."""
     if not found:
         return ""
     outputs = list(found[0].deviations)
@@ -80,12 +108,21 @@ def shifts_text(found: Sequence[ShiftDeviation]) -> str:
         )
         for shift in found
     ]
-    means = [_mean([shift.deviations[name] for shift in found]) for name in outputs]
-    rows.append(("mean", "-", "-", *(percent(mean, 2) for mean in means)))
+    means = mean_deviations(found)
+    rows.append(("mean", "-", "-", *(percent(means[name], 2) for name in outputs)))
     head = ("deviation of the shift", "from", "takes", *map(public_name, outputs))
     return columns(head, rows)
 
 
-def _mean(values: Sequence[float]) -> float:
-    known = [value for value in values if np.isfinite(value)]
-    return sum(known) / len(known) if known else float("nan")
+def cases_text(found: Sequence[ShiftDeviation]) -> str:
+    """Table I of paper 003: mean deviation of each output by case, and the mean of the cases."""
+    cases = case_deviations(found)
+    if not cases:
+        return ""
+    means = mean_deviations(cases)
+    rows = [
+        (each.case, str(each.shifts), *(percent(each.deviations.get(n, nan), 2) for n in means))
+        for each in cases
+    ]
+    rows.append(("mean of the cases", str(len(found)), *(percent(e, 2) for e in means.values())))
+    return columns(("mean deviation by case", "shifts", *map(public_name, means)), rows)

@@ -7,7 +7,7 @@ import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from difflib import get_close_matches
+from difflib import SequenceMatcher, get_close_matches
 from pathlib import Path
 
 
@@ -57,6 +57,11 @@ def nearest(name: object, known: Iterable[str]) -> str:
     """The known name that looks most like this one; empty where none does."""
     found = get_close_matches(str(name), list(known), n=1)
     return found[0] if found else ""
+
+
+def likest_first(name: str, known: Iterable[str]) -> list[str]:
+    """The known names, those that look most like this one first."""
+    return sorted(known, key=lambda each: -SequenceMatcher(None, name, each).ratio())
 
 
 def listed(names: Iterable[object], most: int = 12) -> str:

@@ -23,6 +23,8 @@ class Recording:
     starts
         First sample of each piece, in order; a recording without gaps has one piece, (0,).
         Pieces are simulated separately.
+    unmapped
+        Names of the columns in its file that the rig does not read.
     """
 
     name: str
@@ -31,6 +33,7 @@ class Recording:
     noise: Mapping[str, float] = field(default_factory=dict)
     starts: tuple[int, ...] = (0,)
     source: str = ""
+    unmapped: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         lengths = {channel: len(values) for channel, values in self.channels.items()}

@@ -54,6 +54,7 @@ def identify(
     with answering(quiet) as say:
         from studies.identification_text import (
             guide_text,
+            identification_document,
             identified_text,
             known_procedure,
             procedures_text,
@@ -62,7 +63,6 @@ def identify(
         if procedure is None or rig is None:
             typer.echo(procedures_text() if procedure is None else guide_text(procedure))
             return
-        from studies.documents import identification_document
         from workbench.errors import InputError, Message
         from workbench.rig import load_rig
         from workbench.rig_writing import write_rig

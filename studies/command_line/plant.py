@@ -20,6 +20,8 @@ from studies.command_line.application import (
 )
 from studies.command_line.files import read_all, writable, write_json
 
+TABLES = "tables"  # a folder inside that of the figures
+
 
 @app.command(cls=Spread, epilog=example("workbench simulate rig.toml train.csv -o simulated.csv"))
 def simulate(
@@ -59,9 +61,13 @@ def compare(
     json: Json = None,
     quiet: Quiet = False,
 ) -> None:
-    """Error by signal, horizon and regime, and where the plant fails."""
+    """Error by signal, horizon and regime, and where the plant fails.
+
+    With --figures also the tables, as CSV and LaTeX, in a folder beside the figures.
+    """
     with answering(quiet) as say:
         from studies.documents import comparison_document
+        from studies.tables import noted_tables, write_tables
         from studies.text_of_comparison import comparison_text
         from workbench.comparison import compare
         from workbench.rig import load_rig
@@ -72,10 +78,13 @@ def compare(
         say("comparing: one step, windows, free run")
         comparison = compare(found, read)
         write_json(json, comparison_document(comparison))
+        with noted_tables() as noted:
+            text = comparison_text(comparison)
         if figures:
             from studies.figures.comparison import comparison_figures
             from studies.figures.style import save_all
 
             save_all(comparison_figures(comparison), figures, command_text())
-            say(f"figures in {figures}")
-        typer.echo(comparison_text(comparison))
+            write_tables(text, noted, figures / TABLES)
+            say(f"figures in {figures}, tables in {figures / TABLES}")
+        typer.echo(text)

@@ -11,6 +11,7 @@ from studies.figures.error_maps import map_figure
 from studies.figures.residuals import residual_figure
 from studies.figures.style import BLUE, GREY, ORANGE, PAGE_IN, RED, new_figure, styled, thinned
 from studies.text import labelled
+from studies.text_of_comparison import shown_regimes
 from workbench.comparison.compare import FREE_RUN, ONE_STEP, PLAIN, WINDOW
 from workbench.units import display_scale, display_unit
 
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
 LINES = {ONE_STEP: ("-.", ORANGE), WINDOW: ("-", BLUE), FREE_RUN: ("--", RED), PLAIN: ("-", BLUE)}
 OVERLAID = (FREE_RUN, WINDOW, PLAIN)
 IN_A_COLUMN = 4  # outputs
-SHOWN_REGIMES = 20
 
 
 def comparison_figures(found: Comparison, prefix: str = "") -> dict[str, Figure]:
@@ -116,8 +116,8 @@ def _mark_worst(axes: Axes, each: RecordingComparison) -> None:
 
 
 def regime_figure(each: RecordingComparison) -> Figure:
-    """Share of the error beside the share of the time, by regime."""
-    shown = each.by_regime[:SHOWN_REGIMES]
+    """Share of the error beside the share of the time, by regime; regimes overlap."""
+    shown = shown_regimes(each.by_regime)
     with styled():
         figure = new_figure(PAGE_IN / 1.5, 0.8 + 0.26 * len(shown))
         axes = figure.subplots()
@@ -130,6 +130,6 @@ def regime_figure(each: RecordingComparison) -> Figure:
         axes.invert_yaxis()
         axes.grid(False, axis="y")
         axes.set_xlabel("share (%)")
-        axes.set_title(f"{each.name}: where the error is, {each.judged}")
+        axes.set_title(f"{each.name}: where the error is, {each.judged}; regimes overlap")
         axes.legend()
     return figure

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,6 +19,7 @@ from studies.figures.style import (
     thinned,
 )
 from studies.text import labelled
+from workbench.diagnosis.result import DecidedBy
 from workbench.units import display_scale, display_unit, public_name
 
 if TYPE_CHECKING:
@@ -25,9 +27,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from workbench.diagnosis.missing_term import Dependence, Loop
-    from workbench.diagnosis.result import Diagnosis, Where
+    from workbench.diagnosis.result import Diagnosis, Ranked, Where
 
 SHOWN, SHOWN_BALANCES = 10, 8
+HOLLOW = {"color": "white", "edgecolor": GREY, "hatch": "....", "linewidth": 0.6}
 SAID = 0.02  # of the variance of a missing term: less that parameters explain is not said
 
 
@@ -40,30 +43,51 @@ def diagnosis_figures(found: Diagnosis, prefix: str = "") -> dict[str, Figure]:
 
 
 def ranking_figure(found: Diagnosis) -> Figure:
-    """How much of the misfit each effect takes away, on both sets; ties share a bracket."""
+    """How much of the misfit each effect takes away, on both sets; ties are marked.
+
+    Rows stand in the order of the ranking: refits first, then what the scan alone decided, whose
+    bars are estimates and may be longer than those of refits above them.
+    """
     rows = found.ranking[:SHOWN]
     leader = rows[0]
     tied = {leader.candidate.name, *leader.tied_with} if leader.tied_with else set()
     with styled():
-        figure = new_figure(COLUMN_IN, 0.9 + 0.27 * len(rows))
+        figure = new_figure(COLUMN_IN, 1.2 + 0.27 * len(rows))
         axes = figure.subplots()
-        places = np.arange(len(rows))
-        train = [100.0 * max(row.drop_train, 0.0) for row in rows]
-        held_out = [100.0 * max(np.nan_to_num(row.drop_validation), 0.0) for row in rows]
-        names = [_ranked_name(row.candidate.name, tied) for row in rows]
-        axes.set_yticks(places, names)
-        axes.barh(places - 0.2, train, 0.38, color=BLUE, label="training")
-        axes.barh(places + 0.2, held_out, 0.38, color=ORANGE, hatch="////", label="validation")
-        for place, row in zip(places, rows, strict=True):
-            if row.accepted:
-                axes.get_yticklabels()[place].set_fontweight("bold")
-        axes.invert_yaxis()
+        axes.set_yticks(range(len(rows)), [_ranked_name(row.candidate.name, tied) for row in rows])
+        for label, row in zip(axes.get_yticklabels(), rows, strict=True):
+            label.set_fontweight("bold" if row.accepted else "normal")
+        _draw_drops(axes, rows)
+        axes.set_ylim(len(rows) - 0.5, -0.5)
         axes.set_xlim(0.0, 105.0)
         axes.set_xlabel("drop of the misfit beyond noise (%)")
         told = "bold: accepted" + ("; =: cannot be told apart here" if tied else "")
-        axes.set_title(f"{found.verdict.value.replace('_', ' ')} ({told})")
-        axes.legend(loc="lower right")
+        figure.suptitle(f"{found.verdict.value.replace('_', ' ')}\n{told}", fontsize=8)
+        if axes.containers:
+            figure.legend(loc="outside lower center", ncols=3, columnspacing=1.0)
     return figure
+
+
+def _draw_drops(axes: Axes, rows: Sequence[Ranked]) -> None:
+    """Two bars for a refit, one hollow bar for what the scan alone decided."""
+    refitted = [k for k, row in enumerate(rows) if row.decided_by is DecidedBy.REFIT]
+    scanned = [k for k, row in enumerate(rows) if row.decided_by is DecidedBy.SCAN]
+    held_out = [k for k in refitted if np.isfinite(rows[k].drop_validation)]
+    train = {k: _bar(rows[k].drop_train) for k in (*refitted, *scanned)}
+    checked = {k: _bar(rows[k].drop_validation) for k in held_out}
+    bars = (
+        (refitted, train, -0.2, {"color": BLUE, "label": "training"}),
+        (held_out, checked, 0.2, {"color": ORANGE, "hatch": "////", "label": "validation"}),
+        (scanned, train, 0.0, HOLLOW | {"label": "training, only scanned"}),
+    )
+    for places, drops, shift, look in bars:
+        if places:
+            axes.barh([k + shift for k in places], [drops[k] for k in places], 0.38, **look)
+
+
+def _bar(share: float) -> float:
+    """Length of a bar in percent: none for what makes the misfit larger."""
+    return 100.0 * max(share, 0.0)
 
 
 def _ranked_name(name: str, tied: set[str]) -> str:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from studies.page.look import html_table
 from studies.text import number, percent, shown
+from studies.text_of_comparison import shown_regimes
 from workbench.units import display_scale, public_name
 
 if TYPE_CHECKING:
@@ -55,10 +56,10 @@ def regimes_html(found: Sequence[RegimeErrors], horizon: str) -> str:
     for name in names:
         head += [f"{public_name(name)} RMSE", "fit %"]
     rows = []
-    for each in found[:SHOWN_REGIMES]:
+    for each in shown_regimes(found, SHOWN_REGIMES):
         line = [each.name, percent(each.share_of_time), percent(each.share_of_error)]
         for name in names:
             error = each.errors[name]
             line += [shown(error.rmse, name, 3), number(error.fit_percent, 3)]
         rows.append(line)
-    return f"<h2>By regime, {escape(horizon)}</h2>" + html_table(head, rows)
+    return f"<h2>By regime, {escape(horizon)}; regimes overlap</h2>" + html_table(head, rows)

@@ -33,6 +33,7 @@ REACH = 1.0 / 4.0  # of the pitch, on either side of a notch
 REACHED = 1.0 / 24.0  # of the pitch: half a millimetre, which friction leaves to the detent
 GEARS = {-1: "L", 0: "N", 1: "H"}
 BETWEEN = 99  # no notch
+PHASES = ("in neutral", "in gear", "release", "engaging", "synchronising", "travel")
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,8 +77,7 @@ def phases(course: Course) -> dict[str, np.ndarray]:
         return {}
     x, moving = gears.place.value, gears.place.moving
     notch = _notch(x, gears.pitch_m, REACH)
-    names = ("in neutral", "in gear", "release", "engaging", "synchronising", "travel")
-    found = {name: np.zeros(len(x), dtype=bool) for name in names}
+    found = {name: np.zeros(len(x), dtype=bool) for name in PHASES}
     for first, last in _visits(notch, course.recording.starts):
         rest = np.flatnonzero(moving[first:last] == 0) + first
         if not len(rest):

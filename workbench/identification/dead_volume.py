@@ -22,7 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from workbench.errors import InputError, Message
+from workbench.errors import InputError, Message, likest_first, listed
 from workbench.identification.held_gas import (
     STILL_M,
     geometry,
@@ -34,6 +34,7 @@ from workbench.parts import Chamber
 from workbench.plant import Plant
 from workbench.recording import Recording
 from workbench.rig import Rig
+from workbench.units import public_name
 
 TANK_M3 = 0.344e-3  # E002-10
 TANK_CHANNEL = "supply.pressure_pa"
@@ -42,6 +43,7 @@ LEAST_RISE = 0.05  # of the pressure of the tank
 SAME = 0.01  # of the pressure: the tank has emptied into the chamber
 GAUGE_ERROR = 1e-3  # of a pressure sensor's span of 10 bar: its share in the deviation
 SPAN_PA = 10e5
+NEAREST = 3  # columns that may hold the tank's pressure
 
 
 @dataclass(frozen=True)
@@ -101,8 +103,7 @@ def dead_volume(
 def _locked(plant: Plant, recording: Recording) -> Chamber:
     """The chamber that is filled, its piston locked."""
     if TANK_CHANNEL not in recording.channels:
-        what = "is no reservoir test: the pressure of the tank is not recorded"
-        raise unfit(recording, what, "it as supply.pressure, where the tank stands for the supply")
+        raise _no_tank(recording)
     chamber = pressed_chamber(plant, recording)
     if not isinstance(chamber, Chamber):
         what = "has no cylinder chamber, whose dead volume could be found"
@@ -112,6 +113,21 @@ def _locked(plant: Plant, recording: Recording) -> Chamber:
         what = f"is no reservoir test: the piston moves by {1e3 * moved_m:.3g} mm"
         raise unfit(recording, what, "a piston locked in its place")
     return chamber
+
+
+def _no_tank(recording: Recording) -> InputError:
+    """The complaint that a recording lacks the tank, with columns that may hold it."""
+    name = public_name(TANK_CHANNEL)
+    if not recording.unmapped:
+        what = "is no reservoir test: the pressure of the tank is not recorded"
+        return unfit(recording, what, f"it as {name}, where the tank stands for the supply")
+    unread = listed(likest_first(name, recording.unmapped), most=NEAREST)
+    what = (
+        f"the rig maps no column to {name}, where the tank stands for the supply; "
+        f"it does not read {unread}"
+    )
+    expected = f"the column of the tank's pressure as {name} in [recording.channels]"
+    return unfit(recording, what, expected)
 
 
 def _release(chamber: Chamber, recording: Recording) -> Release:

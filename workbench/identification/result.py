@@ -33,12 +33,16 @@ def estimated(
 
 @dataclass(frozen=True, kw_only=True)
 class Curve:
-    """What was measured and what was fitted over a common axis, each of shape (n,)."""
+    """What was measured and what was fitted over a common axis, each of shape (n,).
+
+    ``at_bound`` names the curve's own values that ended at the end of their range.
+    """
 
     label: str
     along: np.ndarray
     measured: np.ndarray
     fitted: np.ndarray
+    at_bound: tuple[str, ...] = ()
 
     @property
     def residual(self) -> np.ndarray:

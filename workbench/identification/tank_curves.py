@@ -22,6 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import isfinite
 
 import numpy as np
 
@@ -37,6 +38,7 @@ from workbench.identification.result import (
     known_before,
 )
 from workbench.identification.runs import outputs_under
+from workbench.identification.standing import end_reached
 from workbench.identification.tank import tank_on_valve
 from workbench.identification.tank_pieces import LEAST_OPEN, Piece, open_sides, tank_pieces
 from workbench.plant import Plant
@@ -67,6 +69,11 @@ class TankCurve(Curve):
     critical_ratio: Estimate
     cracking_ratio: Estimate
     subsonic_index: Estimate
+
+    @property
+    def shape(self) -> dict[str, Estimate]:
+        """The shape of the flow function, by the letters of the paper."""
+        return {"b": self.critical_ratio, "a": self.cracking_ratio, "m": self.subsonic_index}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -189,6 +196,7 @@ def _curve(plant: Plant, names: _Names, piece: Piece, noise: float) -> TankCurve
     size = np.array([full_m2, 1.0, 1.0, 1.0])
     keys = ("area_m2", "critical_ratio", "cracking_ratio", "subsonic_index")
     told = estimated(keys, size * found.values[:4], size * found.deviations[:4])
+    shapes = zip(keys[1:], shape[1:], found.values[1:4], strict=True)
     return TankCurve(
         label=f"{'charging' if piece.charging else 'discharging'} {piece.command_v:.2f} V",
         along=time_s,
@@ -196,6 +204,7 @@ def _curve(plant: Plant, names: _Names, piece: Piece, noise: float) -> TankCurve
         fitted=measured - found.residuals,
         command_v=piece.command_v,
         charging=piece.charging,
+        at_bound=tuple(k for k, name, x in shapes if isfinite(end_reached(known[name], x))),
         **dict(zip(keys, told, strict=True)),
     )
 

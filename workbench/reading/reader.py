@@ -54,10 +54,13 @@ def read_recording(rig: Rig, path: Path | str) -> Recording:
         channels[velocity] = derivative(channels[position], grid.sample_time_s, grid.starts)
     outputs = set(rig.plant.measured + rig.plant.optional_outputs)
     warn_of_sensors(channels, outputs, table.file)
-    return _recording(rig, path, channels, grid)
+    unmapped = tuple(name for k, name in enumerate(table.names) if k not in numbers)
+    return _recording(rig, path, channels, grid, unmapped)
 
 
-def _recording(rig: Rig, path: Path, channels: dict[str, np.ndarray], grid: Grid) -> Recording:
+def _recording(
+    rig: Rig, path: Path, channels: dict[str, np.ndarray], grid: Grid, unmapped: tuple[str, ...]
+) -> Recording:
     noise = {
         name: channel.noise
         for name, channel in rig.reader.channels.items()
@@ -70,6 +73,7 @@ def _recording(rig: Rig, path: Path, channels: dict[str, np.ndarray], grid: Grid
         noise=noise,
         starts=grid.starts,
         source=str(path),
+        unmapped=unmapped,
     )
 
 

@@ -1,0 +1,33 @@
+"""The figure of a ranking: its key, and bars of refits beside those of a scan."""
+
+import csv
+
+from test_report import diagnosis
+
+from studies.figures.diagnosis import diagnosis_figures
+from studies.figures.style import save
+from workbench.diagnosis.result import Verdict
+
+
+def test_the_key_of_a_tied_ranking_fits_its_page():
+    tied = diagnosis(Verdict.RECORDING_TOO_WEAK, tied=("spool_leak",))
+    figure = diagnosis_figures(tied)["ranking"]
+    figure.draw_without_rendering()
+    drawn = figure.get_tightbbox()  # in inches
+    width, height = figure.get_size_inches()
+
+    assert "=: cannot be told apart here" in figure.get_suptitle()
+    assert drawn.x0 >= 0.0 and drawn.y0 >= 0.0
+    assert drawn.x1 <= width and drawn.y1 <= height
+
+
+def test_a_scanned_effect_does_not_look_like_a_refit_in_the_ranking(tmp_path):
+    save(diagnosis_figures(diagnosis())["ranking"], tmp_path / "ranking", "workbench diagnose")
+    with (tmp_path / "ranking.csv").open(newline="") as file:
+        told = {(curve, effect): drop for _, curve, effect, drop in list(csv.reader(file))[1:]}
+
+    assert told == {
+        ("training", "chamber_leak@chamber_a"): "93",
+        ("validation", "chamber_leak@chamber_a"): "91",
+        ("training, only scanned", "valve_lag"): "10",
+    }
