@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from workbench.diagnosis.improvement import Improvement, Stage
     from workbench.diagnosis.passes import Removal, Swap
     from workbench.fitting.errors import Errors
+    from workbench.fitting.posterior import Moved
 
 CAME, REFITTED, END = (Change.START.value, "refitted", "in the end")
 FREE_RUNS = (
@@ -151,18 +152,20 @@ def improvement_document(found: Improvement, unit_of: Mapping[str, str]) -> Docu
             "before": errors(found.free_before, unit_of),
             "after": errors(found.free_after, unit_of),
         },
-        "parameters": [
-            {
-                "name": public_name(row.name),
-                "unit": si_unit(row.name),
-                "before": plain(row.before),
-                "before_std": plain(row.prior_deviation),
-                "after": plain(row.after),
-                "after_std": plain(row.deviation),
-                "at_bound": row.at_bound,
-                "prior_deviations_moved": plain(row.far),
-            }
-            for row in found.parameters
-        ],
+        "parameters": [_parameter_document(row) for row in found.parameters],
         "stopped": found.stopped,
+    }
+
+
+def _parameter_document(row: Moved) -> Document:
+    """A parameter before and after, in SI."""
+    return {
+        "name": public_name(row.name),
+        "unit": si_unit(row.name),
+        "before": plain(row.before),
+        "before_std": plain(row.prior_deviation),
+        "after": plain(row.after),
+        "after_std": plain(row.deviation),
+        "at_bound": row.at_bound,
+        "prior_deviations_moved": plain(row.far),
     }

@@ -132,7 +132,7 @@ def test_compare_writes_each_figure_in_four_files(folder, simulated):
 
     assert answer.exit_code == 0, answer.output
     assert answer.stderr == ""
-    stems = {path.stem for path in place.iterdir()}
+    stems = {path.stem for path in place.iterdir() if path.is_file()}
     kinds = "comparison", "regimes", "error_over_motion", "error_over_command", "residuals"
     assert stems == {f"{kind}_simulated" for kind in kinds}
     for stem in stems:
