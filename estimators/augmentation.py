@@ -102,9 +102,6 @@ class AugmentedPlant(Plant):
             rates=ca.vertcat(rates + E @ w, fading * w),
             outputs=outputs,
             tolerances=np.append(base.tolerances, np.full(len(self.unknown), inf)),
-            _steps={},
-            _compiled={},
-            _blocks={},
         )
 
 

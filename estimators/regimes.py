@@ -98,9 +98,6 @@ class Regime(Plant):
             rates=rates,
             outputs=outputs,
             tolerances=base.tolerances[kept],
-            _steps={},
-            _compiled={},
-            _blocks={},
         )
 
 
