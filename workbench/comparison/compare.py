@@ -142,10 +142,8 @@ def _compared(rig: Rig, recording: Recording) -> RecordingComparison:
     ahead = simulated[_first_of((ONE_STEP, PLAIN), simulated)]
     errors = {name: measured[name] - judged[name] for name in measured}
     shifts, more = _shifts(course)
-    squared, length_s = (
-        equally_weighted(np.array([*errors.values()])),
-        window_length_s(plant, [recording]),
-    )
+    squared = equally_weighted(np.array([*errors.values()]))
+    length_s = window_length_s(plant, [recording])
     return RecordingComparison(
         name=recording.name,
         time_s=recording.time_s,

@@ -51,11 +51,10 @@ def foretold(course: Course, noise: Mapping[str, float]) -> tuple[dict[str, Rows
         free = _free_run(course)
     except ArithmeticError as error:
         notes.append(f"no free run: {error}")
-    filtered = _followed(course, noise, free)
+    filtered, unsaid = _followed(course, noise, free)
     found, paths = {ONE_STEP: _one_step(recording, filtered)}, [filtered.states]
-    notes += lost(recording, found[ONE_STEP])
+    notes += [*lost(recording, found[ONE_STEP]), *unsaid]
     if free:
-        notes += [ASTRAY] if _astray(recording, filtered, free) else []
         paths.append(np.array([free[name] for name in plant.model.states]))
     try:
         windows = cut_windows(plant, [recording], noise, window_length_s(plant, [recording]))
@@ -89,13 +88,16 @@ def _outputs(plant: Plant, recording: Recording) -> Rows:
     return {name: recording[name] for name in plant.measured}
 
 
-def _followed(course: Course, noise: Mapping[str, float], free: Rows | None) -> FilterResult:
-    """The filter over the recording; see the module for what it does where it goes astray."""
+def _followed(
+    course: Course, noise: Mapping[str, float], free: Rows | None
+) -> tuple[FilterResult, list[str]]:
+    """The filter over the recording, and in words where the careful one goes astray too."""
     filtered = _filtered(course, noise)
     if not free or not _astray(course.recording, filtered, free):
-        return filtered
+        return filtered, []
     careful = _filtered(course, noise, beside_measured(course.plant))
-    return max(filtered, careful, key=_likely)
+    likelier = max(filtered, careful, key=_likely)
+    return likelier, [ASTRAY] if _astray(course.recording, likelier, free) else []
 
 
 def beside_measured(plant: Plant) -> tuple[str, ...]:

@@ -67,12 +67,12 @@ def chosen(
 def inside(fits: Sequence[Fit], limits: Limits, library: Sequence[Manoeuvre]) -> list[Rehearsed]:
     """Manoeuvres that break no limit for any plant, each as large as it may be."""
     left = [each for each in library if each.drive is limits.drive]
-    maps = speed_maps(fits[0], limits)
+    maps = tuple(speed_maps(fits[0], limits))
     found = []
     for share in SHARES:
         if not left:
             break
-        tried = [Rehearsed(each, each.make(limits, share), ()) for each in left]
+        tried = [Rehearsed(each, each.make(limits, share), (), maps) for each in left]
         for fit in fits:
             runs = rehearse(fit, limits, [each.play for each in tried], maps)
             tried = [
@@ -90,8 +90,7 @@ def asked_for(
     plants: Plants, limits: Limits, best: Rehearsed, gain: float, alike: Pairs
 ) -> NextRecording:
     """The answer in words and numbers."""
-    likeliest = next(iter(plants.values()))
-    windows = likeliest.windows
+    windows = next(iter(plants.values())).windows
     looped = best.play.looped
     how = "its reference followed by a position loop" if looped else "its commands played"
     length_s = limits.sample_time_s * limits.samples
@@ -113,6 +112,6 @@ def asked_for(
             windows.plant.measured,
             best.recorded,
             windows.recordings,
-            speed_maps(likeliest, limits) if looped else (),
+            best.maps if looped else (),
         ),
     )

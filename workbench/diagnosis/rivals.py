@@ -30,6 +30,7 @@ from workbench.fitting.unknowns import Unknowns
 from workbench.fitting.window_cuts import cut_rows, evenly
 from workbench.fitting.windows import Windows
 from workbench.manoeuvres.play import Manoeuvre, Play
+from workbench.manoeuvres.rehearse import SpeedMap
 from workbench.recording import Recording
 
 STEPS = 4  # of start states
@@ -39,11 +40,15 @@ Near = tuple[Linearised, tuple[Windows, Unknowns]]  # derivatives and what they 
 
 @dataclass(frozen=True)
 class Rehearsed:
-    """One manoeuvre and what each rival would record of it, in the rivals' order."""
+    """One manoeuvre and what each rival would record of it, in the rivals' order.
+
+    ``maps`` are the speed maps of the axes in the loop, that of the likeliest rival.
+    """
 
     manoeuvre: Manoeuvre
     play: Play
     recorded: tuple[Recording, ...]
+    maps: tuple[SpeedMap, ...] = ()
 
 
 def distances(

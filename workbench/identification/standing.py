@@ -8,7 +8,7 @@ the end of its range a value is no result, and its deviation says nothing.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf, nan
+from math import inf, isnan, nan
 
 from workbench.effect import Parameter
 from workbench.identification.result import Estimate
@@ -37,7 +37,7 @@ class Standing:
     @property
     def at_bound(self) -> bool:
         """True where it lies at an end of its range, or beyond."""
-        return self.end == self.end
+        return not isnan(self.end)
 
     @property
     def far(self) -> bool:
