@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from workbench.comparison.compare import Comparison, RecordingComparison
     from workbench.diagnosis.result import Diagnosis, Law, NextRecording, Ranked, Where
     from workbench.fitting.errors import SignalError
+    from workbench.fitting.posterior import Moved
     from workbench.plant import Candidate
 
 Document = dict[str, Any]
@@ -104,6 +105,7 @@ def diagnosis_document(found: Diagnosis, unit_of: Mapping[str, str]) -> Document
         "ranking": [_ranked(row) for row in found.ranking],
         "where": _where(found.where) if found.where else None,
         "law": law_document(found.law) if found.law else None,
+        "strained": [moved_document(row) for row in found.strained],
         "before": errors(found.before, unit_of),
         "after": {"train": {}, "validation": {}} | errors(found.after, unit_of),
         "next_recording": _next_recording(found.next_recording),
@@ -170,6 +172,20 @@ def plain(value: float) -> float | None:
     return float(value) if isfinite(value) else None
 
 
+def moved_document(row: Moved) -> Document:
+    """A parameter before and after a fit, in SI."""
+    return {
+        "name": public_name(row.name),
+        "unit": si_unit(row.name),
+        "before": plain(row.before),
+        "before_std": plain(row.prior_deviation),
+        "after": plain(row.after),
+        "after_std": plain(row.deviation),
+        "at_bound": row.at_bound,
+        "prior_deviations_moved": plain(row.far),
+    }
+
+
 def _partner(candidate: Candidate) -> Document | None:
     """The second effect of a pair."""
     return next(({"effect": c.cause.name, "at": c.place} for c in candidate.singles[1:]), None)
@@ -193,6 +209,7 @@ def _ranked(row: Ranked) -> Document:
         },
         "error_drop_train": plain(told(row.drop_train)),
         "error_drop_validation": plain(told(row.drop_validation)),
+        "plain_error_validation": plain(row.plain_validation),
         "error_drop_wide_priors": plain(told(row.drop_wide)),
         "modification_index": plain(row.modification_index),
         "tied_with": list(row.tied_with),
@@ -245,8 +262,12 @@ def law_document(law: Law) -> Document:
     return {
         "balance": law.balance,
         "terms": {
-            public_name(name): {"value": plain(value), "unit": si_unit(name)}
-            for name, value in law.terms.items()
+            public_name(name): {
+                "value": plain(size.value),
+                "unit": si_unit(name),
+                "std": plain(size.deviation),
+            }
+            for name, size in law.terms.items()
         },
         "ranges": {
             public_name(name): {"low": plain(low), "high": plain(high), "unit": si_unit(name)}

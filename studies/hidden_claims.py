@@ -103,7 +103,6 @@ def _of_others(rows: Sequence[Row], enough: Enough) -> Iterator[Claim]:
         ("no false name where nothing is hidden", _right(of[Kind.NOTHING]), 1.0),
         ("effects of pairs found", accepted, 0.85),
         ("pairs without a wrong effect", [r.wrong == 0 for r in of[Kind.PAIR]], 1.0),
-        ("laws in the right balance", [r.balance_right for r in of[Kind.LAW]], 1.0),
         ("recordings called too weak", _right(of[Kind.WEAK]), 5 / 6),
         ("the same first name with priors three times as wide", same, 0.90),
     )
@@ -114,11 +113,17 @@ def _of_others(rows: Sequence[Row], enough: Enough) -> Iterator[Claim]:
 
 def _laws(rows: Sequence[Row], enough: Enough) -> Iterator[Claim]:
     """The bar for laws is for the six of the servo drive; the one of each other plant is told."""
-    others = [r.right for r in rows if r.plant != SERVO_DRIVE.plant]
-    told = f"; on other plants {sum(others)} of {len(others)}" if others else ""
-    six = [r.right for r in rows if r.plant == SERVO_DRIVE.plant]
-    for claim in _share("laws called outside the catalogue", six, 5 / 6, enough):
-        yield replace(claim, found=claim.found + told)
+    six = [r for r in rows if r.plant == SERVO_DRIVE.plant]
+    others = [r for r in rows if r.plant != SERVO_DRIVE.plant]
+    asked: tuple[tuple[str, Callable[[Row], bool], float], ...] = (
+        ("laws called outside the catalogue", lambda row: row.right, 5 / 6),
+        ("laws in the right balance", lambda row: row.balance_right, 1.0),
+    )
+    for what, holds, least in asked:
+        elsewhere = sum(map(holds, others))
+        told = f"; on other plants {elsewhere} of {len(others)}" if others else ""
+        for claim in _share(what, [*map(holds, six)], least, enough):
+            yield replace(claim, found=claim.found + told)
 
 
 def _is_there(row: Row) -> bool:

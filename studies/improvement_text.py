@@ -5,18 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from studies.documents import Document, errors, law_document, plain
+from studies.documents import Document, errors, law_document, moved_document, plain
 from studies.text import columns, number, removed
 from studies.text_of_results import errors_over, law_text, moved_text, windows_text
 from workbench.diagnosis.improvement import Change
 from workbench.diagnosis.result import told
-from workbench.units import public_name, si_unit
 
 if TYPE_CHECKING:
     from workbench.diagnosis.improvement import Improvement, Stage
     from workbench.diagnosis.passes import Removal, Swap
     from workbench.fitting.errors import Errors
-    from workbench.fitting.posterior import Moved
 
 CAME, REFITTED, END = (Change.START.value, "refitted", "in the end")
 FREE_RUNS = (
@@ -152,20 +150,6 @@ def improvement_document(found: Improvement, unit_of: Mapping[str, str]) -> Docu
             "before": errors(found.free_before, unit_of),
             "after": errors(found.free_after, unit_of),
         },
-        "parameters": [_parameter_document(row) for row in found.parameters],
+        "parameters": [moved_document(row) for row in found.parameters],
         "stopped": found.stopped,
-    }
-
-
-def _parameter_document(row: Moved) -> Document:
-    """A parameter before and after, in SI."""
-    return {
-        "name": public_name(row.name),
-        "unit": si_unit(row.name),
-        "before": plain(row.before),
-        "before_std": plain(row.prior_deviation),
-        "after": plain(row.after),
-        "after_std": plain(row.deviation),
-        "at_bound": row.at_bound,
-        "prior_deviations_moved": plain(row.far),
     }

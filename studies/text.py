@@ -41,6 +41,12 @@ def shown(value: float, name: str, digits: int = 4) -> str:
     return f"{number(display_scale(name).from_si(value), digits)} {display_unit(name)}".strip()
 
 
+def spread(value: float, deviation: float, name: str, digits: int = 4) -> str:
+    """A quantity with its standard deviation, where it has one."""
+    known = f" ± {shown(deviation, name, 2)}" if isfinite(deviation) else ""
+    return shown(value, name, digits) + known
+
+
 def labelled(name: str) -> str:
     """A quantity in words with its unit, for an axis: ``chamber a pressure (bar)``."""
     unit = display_unit(name)

@@ -6,8 +6,10 @@ from collections.abc import Mapping, Sequence
 from math import isfinite
 from typing import TYPE_CHECKING
 
-from studies.text import columns, number, percent, removed, shown
+from studies.text import columns, number, percent, removed, shown, spread
 from studies.text_of_next_recording import next_recording_text
+from studies.text_of_ranking import imitated_text, ranking_text
+from workbench.fitting.posterior import FAR_MOVED
 from workbench.units import public_name
 
 if TYPE_CHECKING:
@@ -15,15 +17,14 @@ if TYPE_CHECKING:
 
     from workbench.diagnosis.addition import Addition
     from workbench.diagnosis.missing_term import Dependence, Loop
-    from workbench.diagnosis.result import Diagnosis, Law, Ranked
+    from workbench.diagnosis.result import Diagnosis, Law
     from workbench.fitting.errors import SignalError
     from workbench.fitting.fit import FitReport
     from workbench.fitting.gauss_newton import Fit
     from workbench.fitting.posterior import Moved
 
-SHOWN_RANKS = 12
 CORRELATED = 0.9
-FAR_MOVED = 2.0  # prior deviations: more is told
+SHOWN_STRAINED = 4
 
 Errors = Mapping[str, Mapping[str, "SignalError"]]
 
@@ -36,52 +37,18 @@ def diagnosis_text(found: Diagnosis, unit_of: Mapping[str, str]) -> str:
     """
     parts = [f"verdict: {found.verdict.value}: {found.sentence}"]
     parts += [f"warning: {warning}" for warning in found.warnings]
-    parts += ["", ranking_text(found), *(_imitated_text(found.named) if found.named else ())]
+    parts += ["", ranking_text(found), *(imitated_text(found.named) if found.named else ())]
     if found.law:
         parts += ["", law_text(found.law)]
     if found.where:
         parts += ["", where_text(found)]
+    parts += strained_text(found)
     if unit_of:
         told = before_after_text(found.before, found.after, unit_of)
         parts += ["", told if found.after else errors_text(found.before, unit_of)]
     if found.next_recording:
         parts += ["", next_recording_text(found.next_recording)]
     return "\n".join(parts)
-
-
-def _imitated_text(leader: Ranked) -> list[str]:
-    """What each of a tie would explain of the first of it."""
-    return [
-        f"if {leader.candidate.name} is the truth, {name} would explain {percent(share)} of it"
-        for name, share in leader.imitated_by.items()
-        if name in leader.tied_with
-    ]
-
-
-def ranking_text(found: Diagnosis) -> str:
-    """The best of the ranking as a table.
-
-    The index is the modification index, in chi2; compensable is what the fitted parameters can
-    imitate.
-    """
-    rows = [
-        (
-            str(place),
-            row.candidate.name,
-            removed(row.drop_train),
-            removed(row.drop_validation),
-            number(row.modification_index, 3),
-            percent(row.compensable),
-            sizes_text(row),
-            row.decided_by.value,
-            _remark(row),
-        )
-        for place, row in enumerate(found.ranking[:SHOWN_RANKS], start=1)
-    ]
-    head = ("", "effect", "drop train", "validation", "mod. index", "compensable", "size", "by", "")
-    rest = len(found.ranking) - SHOWN_RANKS
-    more = f"\n... and {rest} more, in the JSON" if rest > 0 else ""
-    return columns(head, rows) + more
 
 
 def law_text(law: Law) -> str:
@@ -97,25 +64,6 @@ def law_text(law: Law) -> str:
         f"seen for {', '.join(ranges)}\n"
         "`workbench add RIG law --fit ...` takes it, `improve --law` does where nothing else helps"
     )
-
-
-def sizes_text(row: Ranked) -> str:
-    """Strength and forms with their standard deviations."""
-    sizes = (spread(size.value, size.deviation, name, 3) for name, size in row.size.items())
-    return ", ".join(sizes) or "-"
-
-
-def _remark(row: Ranked) -> str:
-    if row.accepted:
-        return f"accepted, tied with {', '.join(row.tied_with)}" if row.tied_with else "accepted"
-    return "; ".join((*row.reasons, *([_blind_text(row)] if row.blind else [])))
-
-
-def _blind_text(row: Ranked) -> str:
-    """From which size this recording would show a candidate that it hardly shows."""
-    if not isfinite(row.visible_from):
-        return "this recording cannot show it"
-    return f"seen here from {number(row.visible_from, 2)} times its typical size"
 
 
 def where_text(found: Diagnosis) -> str:
@@ -134,6 +82,19 @@ def where_text(found: Diagnosis) -> str:
     shares = [f"{name} {percent(share)}" for name, share in where.by_regime.items()][:4]
     left = f"error left by the prior fit (regimes overlap): {', '.join(shares)}"
     return "\n".join([*lines, *([left] if shares else [])])
+
+
+def strained_text(found: Diagnosis) -> list[str]:
+    """Parameters that the prior fit took far from what is known of them; no line without."""
+    farthest = sorted(found.strained, key=lambda row: -row.far)
+    told = [
+        f"{public_name(row.name)} {shown(row.before, row.name)} to {shown(row.after, row.name)} "
+        f"({number(row.far, 2)} prior deviations)"
+        for row in farthest[:SHOWN_STRAINED]
+    ]
+    more = [f"and {len(farthest) - len(told)} more"] if len(farthest) > len(told) else []
+    line = ", ".join((*told, *more))
+    return [f"suspects, which the prior fit takes far from their priors: {line}"] if line else []
 
 
 def _memory_text(followed: Dependence, loop: Loop) -> str:
@@ -218,12 +179,6 @@ def errors_text(sets: Errors, unit_of: Mapping[str, str]) -> str:
     ]
     table = columns(("set", "signal", "RMSE", "fit %", "noise", "chi2/n"), rows)
     return "\n".join((table, *_left_out(sets)))
-
-
-def spread(value: float, deviation: float, name: str, digits: int = 4) -> str:
-    """A quantity with its standard deviation, where it has one."""
-    known = f" ± {shown(deviation, name, 2)}" if isfinite(deviation) else ""
-    return shown(value, name, digits) + known
 
 
 def unit_names(outputs: tuple[str, ...]) -> dict[str, str]:

@@ -51,7 +51,11 @@ def test_a_force_of_magnets_along_the_stroke_is_a_sine_of_it():
     law = law_of(posed(wavy))
 
     assert law.balance == "rod.momentum"
-    assert law.terms == {f"{SINE}.size_n": pytest.approx(WAVE_N, rel=0.03)}
+    assert [*law.terms] == [f"{SINE}.size_n"]
+    size = law.terms[f"{SINE}.size_n"]
+    assert size.value == pytest.approx(WAVE_N, rel=0.03)
+    assert 0.0 < size.deviation < 0.1 * WAVE_N
+    assert law.text.endswith(f"of {size.value:.3g} ± {size.deviation:.2g} N")
     assert law.ranges["rod.position_m"] == pytest.approx((-0.03, 0.03), abs=1e-4)
     assert law.drop_validation > 0.95
 

@@ -50,7 +50,7 @@ def test_a_law_outside_the_catalogue_is_its_own_term_in_its_own_balance(hidden):
     assert law.steps[0].candidate.name == TERMS[hidden]
     assert law.drop_validation > 0.2
     if hidden == "quadratic_drag":
-        assert law.terms[DRAG] == pytest.approx(CASES[hidden, 1].size, rel=0.25)
+        assert law.terms[DRAG].value == pytest.approx(CASES[hidden, 1].size, rel=0.25)
 
 
 @pytest.mark.slow

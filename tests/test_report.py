@@ -165,17 +165,17 @@ def test_nothing_missing_names_no_effect():
 
 def test_an_empirical_law_comes_with_its_range():
     names = [f"{kind.causes[0].name}@slide.{kind.causes[0].strength}" for kind in FORCES]
-    terms = dict.fromkeys(names, -240.0)
+    terms = dict.fromkeys(names, Size(-240.0, 12.0))
     ranges = {"slide.velocity_m_s": (-0.5, 0.5), "chamber_a.pressure_pa": (3e5, 6e5)}
     law = Law("slide.momentum", terms, ranges, 0.8, 0.7, "-240 v|v|")
 
     document = diagnosis_document(diagnosis(Verdict.NOT_IN_CATALOGUE, law=law), UNITS)
 
     assert document["law"]["terms"] == {
-        "law[v|v|]@slide.quadratic": {"value": -240.0, "unit": "N s^2/m^2"},
-        "law[v^3]@slide.cubic": {"value": -240.0, "unit": "N s^3/m^3"},
-        "law[v|x - mid|]@slide.placed_viscous": {"value": -240.0, "unit": "N s/m^2"},
-        "law[(x - mid)^2]@slide.curved": {"value": -240.0, "unit": "N/m^2"},
+        "law[v|v|]@slide.quadratic": {"value": -240.0, "std": 12.0, "unit": "N s^2/m^2"},
+        "law[v^3]@slide.cubic": {"value": -240.0, "std": 12.0, "unit": "N s^3/m^3"},
+        "law[v|x - mid|]@slide.placed_viscous": {"value": -240.0, "std": 12.0, "unit": "N s/m^2"},
+        "law[(x - mid)^2]@slide.curved": {"value": -240.0, "std": 12.0, "unit": "N/m^2"},
     }
     assert document["law"]["ranges"] == {
         "slide.velocity": {"low": -0.5, "high": 0.5, "unit": "m/s"},

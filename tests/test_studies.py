@@ -157,6 +157,10 @@ def test_one_law_of_six_may_be_missed_but_not_its_balance():
     other = replace(missed, plant="crr_rig")
     found = {c.claim.partition(",")[0]: c for c in outcome([law] * 6 + [other]).claims}
     assert found["laws called outside the catalogue"].found.endswith("on other plants 0 of 1")
+    there, lost = other, replace(other, balance_right=False)
+    balance = outcome([law] * 6 + [there, lost])
+    (claim,) = (c for c in balance.claims if "right balance" in c.claim)
+    assert claim.holds and claim.found == "6 of 6 (100%); on other plants 1 of 2"
 
 
 def test_other_priors_are_held_against_the_answer_of_the_same_case():

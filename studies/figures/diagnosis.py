@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from workbench.diagnosis.missing_term import Dependence, Loop
     from workbench.diagnosis.result import Diagnosis, Ranked, Where
 
-SHOWN, SHOWN_BALANCES = 10, 8
+SHOWN, SHOWN_BALANCES, SHOWN_DRIVERS = 10, 8, 3
 HOLLOW = {"color": "white", "edgecolor": GREY, "hatch": "....", "linewidth": 0.6}
 SAID = 0.02  # of the variance of a missing term: less that parameters explain is not said
 
@@ -96,17 +96,16 @@ def _ranked_name(name: str, tied: set[str]) -> str:
 
 def missing_term_figure(where: Where) -> Figure:
     """Gain by balance, the missing term in time, and against what drives it most."""
-    strongest = [d for d in where.against if d.bins.shape[1]][:2]
+    strongest = [d for d in where.against if d.bins.shape[1]][:SHOWN_DRIVERS]
     with styled():
-        figure = new_figure(PAGE_IN, 3.6)
-        grid = figure.add_gridspec(2, 1, height_ratios=(1, 1.3))
-        whole = figure.add_subplot(grid[0])
-        inner = grid[1].subgridspec(1, 1 + len(strongest))
-        bottom = [figure.add_subplot(inner[k]) for k in range(1 + len(strongest))]
-        _draw_term(whole, where)
-        _draw_balances(bottom[0], where)
-        for axes, dependence in zip(bottom[1:], strongest, strict=True):
-            _draw_dependence(axes, where, dependence)
+        figure = new_figure(PAGE_IN, 4.0 if strongest else 1.8)
+        rows = figure.add_gridspec(2 if strongest else 1, 1)
+        above = rows[0].subgridspec(1, 2, width_ratios=(2.4, 1))
+        _draw_term(figure.add_subplot(above[0]), where)
+        _draw_balances(figure.add_subplot(above[1]), where)
+        below = rows[1].subgridspec(1, len(strongest)) if strongest else ()
+        for k, dependence in enumerate(strongest):
+            _draw_dependence(figure.add_subplot(below[k]), where, dependence)
     return figure
 
 

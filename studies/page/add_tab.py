@@ -32,8 +32,8 @@ from studies.page.verbs import (
     save,
     with_accepted,
 )
-from studies.text import number, shown
-from studies.text_of_results import spread, unit_names
+from studies.text import number, shown, spread
+from studies.text_of_results import unit_names
 from workbench.units import public_name
 
 if TYPE_CHECKING:

@@ -6,12 +6,12 @@ others gets its own smoother, at the intensity that is likeliest for it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from workbench.diagnosis.dependence import dependences, imitated, parameter_columns
+from workbench.diagnosis.drivers import drivers
 from workbench.diagnosis.missing_term import Course
 from workbench.diagnosis.result import Where
 from workbench.diagnosis.suspects import Suspect, suspects, wandering, with_missing_flows
@@ -67,30 +67,15 @@ def _term(
     course = Course(suspect.state, suspect.parameter, result.states, of.commands, of.measured)
     term = result.unknown[0]
     rest = term - imitated(term, parameter_columns(plant, base.unknowns, course))
-    drivers = _drivers(result.state_names, result.states, plant, of.commands, result.time_s)
     return replace(
         worst,
         balance=suspect.balance,
         term_name=suspect.term,
         term=term,
         term_deviation=result.unknown_deviation[0],
-        against=dependences(drivers, {}, rest, rest),
+        against=dependences(drivers(plant, course, result.time_s), {}, rest, rest),
         intensities=None,
         rest=rest,
         course=course,
         imitated=max(1.0 - float(rest.var() / term.var()), 0.0) if term.any() else 0.0,
     )
-
-
-def _drivers(
-    names: tuple[str, ...],
-    states: np.ndarray,
-    plant: Plant,
-    commands: np.ndarray,
-    time_s: np.ndarray,
-) -> Mapping[str, np.ndarray]:
-    """States, commands and their rates, by name."""
-    drivers = dict(zip(names, states, strict=True))
-    for name, command in zip(plant.model.commands, commands, strict=True):
-        drivers |= {name: command, f"rate of {name}": np.gradient(command, time_s)}
-    return drivers

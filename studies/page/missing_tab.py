@@ -26,7 +26,7 @@ from studies.page.session import Role, Session, recordings
 from studies.page.verbs import diagnose_action, require_train, with_diagnosed, with_saved_commands
 from studies.text import percent
 from studies.text_of_next_recording import conduct_lines
-from studies.text_of_results import sizes_text
+from studies.text_of_ranking import reasons, sizes_text
 
 if TYPE_CHECKING:
     from bokeh.models import Model
@@ -159,7 +159,7 @@ def _table(rows: tuple[Ranked, ...]) -> str:
     """Size with its deviation, what the signature looks like, and what speaks against it."""
     lines = []
     for each in rows:
-        told = "passes every criterion" if each.accepted else "; ".join(each.reasons)
+        told = "passes every criterion" if each.accepted else "; ".join(reasons(each))
         if each.blind:
             told = f"cannot tell here{'; ' + told if told else ''}"
         if each.tied_with:

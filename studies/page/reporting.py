@@ -18,7 +18,8 @@ from studies.modes_text import modes_text
 from studies.page.control_tasks import modes_of
 from studies.report.page import FIGURES, Section, write_report
 from studies.text_of_comparison import comparison_text
-from studies.text_of_results import before_after_text, moved_text, ranking_text, unit_names
+from studies.text_of_ranking import ranking_text
+from studies.text_of_results import before_after_text, moved_text, unit_names
 
 if TYPE_CHECKING:
     from linearize.modes import HybridModel

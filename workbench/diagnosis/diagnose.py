@@ -43,6 +43,7 @@ from workbench.diagnosis.verdict import far_above_noise, judged, sentence, unexp
 from workbench.diagnosis.where import acts_in, locate
 from workbench.effect import Kind
 from workbench.fitting.errors import errors_of
+from workbench.fitting.posterior import strained
 from workbench.fitting.problem import Problem, improved_base, pose
 from workbench.fitting.windows import MOST_WINDOWS
 from workbench.recording import Recording
@@ -121,7 +122,7 @@ def diagnose(
     if best and best.fit and not best.fit.converged:
         warnings += (f"the refit with {best.candidate.name} did not converge: its size may be off",)
     after = (law.fit, law.validation) if law else (best and best.fit, best and best.validation)
-    warnings += unexplained(far, verdict)
+    warnings += unexplained(far, verdict, ranking)
     found = credible(
         Diagnosis(
             rig_name=rig.name,
@@ -137,6 +138,7 @@ def diagnose(
             base_validation=problem.base_validation,
             next_recording=recommended(problem, verdict, ranking, progress),
             evidence=evidence,
+            strained=strained(problem.base),
         ),
         doubts,
     )

@@ -18,8 +18,8 @@ from workbench.candidate import Candidate
 from workbench.diagnosis.judge import clearly_less, reasons_against, share_removed
 from workbench.diagnosis.law_choice import worth_scanning
 from workbench.diagnosis.law_seed import refitted, seeds
-from workbench.diagnosis.refit import Refit, held_out_drop, refit
-from workbench.diagnosis.result import Law, LawTerm, Where
+from workbench.diagnosis.refit import Refit, held_out_drop, refit, sizes
+from workbench.diagnosis.result import Law, LawTerm, Size, Where
 from workbench.diagnosis.rough import rough_fit
 from workbench.diagnosis.scan import Profile, scan
 from workbench.fitting.problem import Problem, misfit
@@ -28,6 +28,7 @@ from workbench.law_scales import scales
 from workbench.plant import Plant
 from workbench.recording import Recording
 from workbench.rig_laws import is_law, law_terms, laws_of, with_laws
+from workbench.units import display_scale, display_unit
 
 MOST_TERMS = 3
 LEAST_TERM_SHARE = 0.10  # of the misfit that another term must take
@@ -145,11 +146,10 @@ def _counted_from(first: Problem, found: Refit) -> Refit:
 
 
 def _law(best: Refit, steps: list[LawTerm]) -> Law:
-    values = best.fit.plant.values
     accepted = [step.candidate for step in steps]
-    terms = {c.strength: values[c.strength] for c in accepted}
+    terms = sizes(best.fit, tuple(c.strength for c in accepted))
     text = " and ".join(
-        f"a term in {c.cause.drivers[0]} on {c.place} ({c.cause.strength} = {size:.3g})"
+        f"a term in {c.cause.drivers[0]} on {c.place} of {_spoken(c.strength, size)}"
         for c, size in zip(accepted, terms.values(), strict=True)
     )
     windows = best.fit.windows
@@ -157,6 +157,12 @@ def _law(best: Refit, steps: list[LawTerm]) -> Law:
     balance = f"{accepted[0].place}.{accepted[0].cause.balance.value}"
     drops = (best.drop_train, best.drop_validation)
     return Law(balance, terms, ranges, *drops, text, tuple(steps), best.fit, best.validation)
+
+
+def _spoken(name: str, size: Size) -> str:
+    """A coefficient with its unit and its deviation."""
+    per = 1.0 / display_scale(name).factor
+    return f"{per * size.value:.3g} ± {per * size.deviation:.2g} {display_unit(name)}"
 
 
 def _members(candidates: Iterable[Candidate]) -> list[str]:

@@ -130,6 +130,7 @@ def refitted_row(
         decided_by=DecidedBy.REFIT,
         accepted=not against,
         reasons=against,
+        plain_validation=each.plain_validation,
         fit=each.fit,
         validation=each.validation,
     )

@@ -13,6 +13,7 @@ from workbench.diagnosis.missing_term import Course, Dependence, Intensities, Lo
 from workbench.effect import Kind
 from workbench.fitting.errors import SignalError
 from workbench.fitting.gauss_newton import Fit
+from workbench.fitting.posterior import Moved
 from workbench.manoeuvres.conduct import Conduct
 from workbench.recording import Recording
 
@@ -92,6 +93,8 @@ class Ranked:
         the scan did not ask.
     modification_index
         Fall of chi2 that the smallest size of the scan promises; NaN likewise.
+    plain_validation
+        Held-out squared error over that of the prior fit, no window capped; NaN without.
     visible_from
         Size in typical sizes from which this recording would show it; NaN where that is not known.
     crowd
@@ -110,6 +113,7 @@ class Ranked:
     decided_by: DecidedBy
     accepted: bool
     reasons: tuple[str, ...]
+    plain_validation: float = float("nan")
     visible_from: float = float("nan")
     crowd: tuple[str, ...] = ()
     imitated_by: Mapping[str, float] = field(default_factory=dict)
@@ -189,13 +193,13 @@ class LawTerm:
 class Law:
     """An empirical law for a balance that no effect of the catalogue explains.
 
-    ``terms`` are coefficients in SI by full parameter name; ``ranges`` the range of each measured
-    output, and of the speed of bodies, in which it was seen; ``steps`` its terms one after the
-    other; ``fit`` and ``validation`` as of a refit.  It is not a physical effect.
+    ``terms`` are coefficients by full parameter name; ``ranges`` the range of each measured output,
+    and of the speed of bodies, in which it was seen; ``steps`` its terms one after the other;
+    ``fit`` and ``validation`` as of a refit.  It is not a physical effect.
     """
 
     balance: str
-    terms: Mapping[str, float]
+    terms: Mapping[str, Size]
     ranges: Mapping[str, tuple[float, float]]
     drop_train: float
     drop_validation: float
@@ -256,6 +260,7 @@ class Diagnosis:
     ``next_recording`` is there where the verdict leaves a question open.
     ``contradicted`` is True where recording and rig contradict each other: whatever the ranking
     accepts then is no effect to be added.
+    ``strained`` are parameters that the prior fit takes far from what is known of them: suspects.
     """
 
     rig_name: str
@@ -272,6 +277,7 @@ class Diagnosis:
     next_recording: NextRecording | None = None
     evidence: Evidence = Evidence.VALIDATION
     contradicted: bool = False
+    strained: tuple[Moved, ...] = ()
 
     @property
     def named(self) -> Ranked | None:

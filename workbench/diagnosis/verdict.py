@@ -75,11 +75,17 @@ def unsteady(
     return (f"with priors {WIDER:g} times as wide {first.name} would lead the scan",)
 
 
-def unexplained(far: Sequence[str], verdict: Verdict) -> tuple[str, ...]:
-    """A warning where nothing is named and the error stays far above the noise all the same."""
+def unexplained(far: Sequence[str], verdict: Verdict, ranking: Sequence[Ranked]) -> tuple[str, ...]:
+    """A warning where nothing is named and the error stays far above the noise all the same.
+
+    What the recording could not show is told then: it is not to be taken for absent.
+    """
     if not far or verdict in NAMING or verdict is Verdict.NOT_IN_CATALOGUE:
         return ()
-    return (f"{UNEXPLAINED}: {', '.join(far)}",)
+    told = f"{UNEXPLAINED}: {', '.join(far)}"
+    if verdict is Verdict.RECORDING_TOO_WEAK or not any(row.blind for row in ranking):
+        return (told,)
+    return (f"{told}; {_blind(ranking)}",)
 
 
 def sentence(
@@ -126,6 +132,11 @@ def _too_weak(ranking: tuple[Ranked, ...]) -> str:
     if leader.accepted:
         rivals = ", ".join((*leader.tied_with, *leader.crowd))
         return f"{_spoken(leader)} and {rivals} do the same to this recording"
+    return _blind(ranking)
+
+
+def _blind(ranking: Sequence[Ranked]) -> str:
+    """What the recording cannot show, in words."""
     blind = [row.candidate.name for row in ranking if row.blind]
     names = ", ".join(blind[:BLIND_SHOWN])
     more = f" and {len(blind) - BLIND_SHOWN} more" if len(blind) > BLIND_SHOWN else ""

@@ -27,6 +27,7 @@ from workbench.diagnosis.dependence import (
     parameter_columns,
     side,
 )
+from workbench.diagnosis.drivers import drivers
 from workbench.diagnosis.missing_term import Course, Intensities
 from workbench.diagnosis.result import Where
 from workbench.diagnosis.suspects import Suspect, suspects, wandering, with_missing_flows
@@ -75,7 +76,7 @@ def locate(problem: Problem, recordings: Sequence[Recording]) -> Where | None:
     term, course = result.unknown[0], _course(plant, recording, result, decimate, worst)
     columns = parameter_columns(plant, problem.base.unknowns, course)
     rest, rest_other = (d - imitated(d, columns) for d in (term, other.unknown[0]))
-    drivers = _drivers(plant, result, course.commands)
+    followed = drivers(plant, course, result.time_s)
     return Where(
         balance=worst.balance,
         by_balance={s.balance: max(0.0, *by.values()) for s, by in gains.items()},
@@ -83,7 +84,7 @@ def locate(problem: Problem, recordings: Sequence[Recording]) -> Where | None:
         time_s=result.time_s,
         term=term,
         term_deviation=result.unknown_deviation[0],
-        against=dependences(drivers, _directions(plant, worst, drivers), rest, rest_other),
+        against=dependences(followed, _directions(plant, worst, followed), rest, rest_other),
         by_regime=regime_shares(problem.base),
         intensities=Intensities(likeliest, neighbour, other.unknown[0]),
         imitated=max(1.0 - float(rest.var() / term.var()), 0.0) if term.any() else 0.0,
@@ -159,24 +160,15 @@ def _course(
     return Course(suspect.state, suspect.parameter, result.states, u, d)
 
 
-def _drivers(plant: Plant, result: FilterResult, commands: np.ndarray) -> dict[str, np.ndarray]:
-    """States, commands and their rates: what a missing term may follow, by name."""
-    drivers = dict(zip(result.state_names, result.states, strict=True))
-    for name, command in zip(plant.model.commands, commands, strict=True):
-        drivers[name] = command
-        drivers[f"rate of {name}"] = np.gradient(command, result.time_s)
-    return drivers
-
-
 def _directions(
-    plant: Plant, suspect: Suspect, drivers: Mapping[str, np.ndarray]
+    plant: Plant, suspect: Suspect, followed: Mapping[str, np.ndarray]
 ) -> dict[str, np.ndarray]:
     """Ways by which a term is split: of the body of its balance, and of each command."""
     place = suspect.balance.rpartition(".")[0]
     bodies = [place, *(getattr(p, "body", None) for p in plant.parts if p.name == place)]
     found = {
         name: side(values)
-        for name, values in drivers.items()
+        for name, values in followed.items()
         if name.partition(".velocity_")[0] in bodies and ".velocity_" in name
     }
-    return found | {name: direction(drivers[name]) for name in plant.model.commands}
+    return found | {name: direction(followed[name]) for name in plant.model.commands}

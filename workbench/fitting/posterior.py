@@ -14,6 +14,8 @@ from workbench.law_range import seen_in
 from workbench.rig import Rig
 from workbench.rig_laws import laws_of
 
+FAR_MOVED = 2.0  # prior deviations: what moves more is worth a word
+
 
 @dataclass(frozen=True)
 class Moved:
@@ -89,6 +91,11 @@ def fitted_rig(rig: Rig, fit: Fit, added: Sequence[str] = ()) -> Rig:
         deviations={**rig.deviations, **{n: d for n, d in deviations.items() if d > 0}},
         seen=seen_in(rig.plant, fit.windows.recordings) if laws_of(rig.plant) else {},
     )
+
+
+def strained(fit: Fit) -> tuple[Moved, ...]:
+    """What a fit took far from what was known of it."""
+    return tuple(each for each in moved_parameters(fit) if each.far > FAR_MOVED)
 
 
 def moved_parameters(fit: Fit) -> tuple[Moved, ...]:

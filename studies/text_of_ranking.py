@@ -1,0 +1,87 @@
+"""The ranking of a diagnosis as text: what each candidate removes, and what speaks against it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import isfinite
+
+from studies.text import columns, number, percent, removed, spread
+from workbench.diagnosis.judge import (
+    HELD_OUT_REASON,
+    LEAST_HELD_OUT,
+    LEAST_SHARE,
+    LEAST_TRAINING,
+    SHARE_REASON,
+    share_removed,
+)
+from workbench.diagnosis.result import Diagnosis, Ranked
+
+SHOWN_RANKS = 12
+
+
+def ranking_text(found: Diagnosis) -> str:
+    """The best of the ranking as a table.
+
+    The index is the modification index, in chi2; compensable is what the fitted parameters can
+    imitate.
+    """
+    rows = [
+        (
+            str(place),
+            row.candidate.name,
+            removed(row.drop_train),
+            removed(row.drop_validation),
+            number(row.modification_index, 3),
+            percent(row.compensable),
+            sizes_text(row),
+            row.decided_by.value,
+            _remark(row),
+        )
+        for place, row in enumerate(found.ranking[:SHOWN_RANKS], start=1)
+    ]
+    head = ("", "effect", "drop train", "validation", "mod. index", "compensable", "size", "by", "")
+    rest = len(found.ranking) - SHOWN_RANKS
+    more = f"\n... and {rest} more, in the JSON" if rest > 0 else ""
+    return columns(head, rows) + more
+
+
+def sizes_text(row: Ranked) -> str:
+    """Strength and forms with their standard deviations."""
+    sizes = (spread(size.value, size.deviation, name, 3) for name, size in row.size.items())
+    return ", ".join(sizes) or "-"
+
+
+def _remark(row: Ranked) -> str:
+    if row.accepted:
+        return f"accepted, tied with {', '.join(row.tied_with)}" if row.tied_with else "accepted"
+    return "; ".join((*reasons(row), *([_blind_text(row)] if row.blind else [])))
+
+
+def reasons(row: Ranked) -> Iterator[str]:
+    """Why a candidate is not accepted; what shares beside it seem to contradict says its number."""
+    share = share_removed(row)
+    for reason in row.reasons:
+        if reason == SHARE_REASON and share < LEAST_SHARE and isfinite(row.drop_validation):
+            yield f"{reason} ({percent(share, 1)} as the mean of both sets)"
+        elif reason == SHARE_REASON and share >= LEAST_SHARE:
+            yield f"{reason} (less than {percent(LEAST_TRAINING)} in training)"
+        elif reason == HELD_OUT_REASON and row.drop_validation > LEAST_HELD_OUT:
+            yield f"{reason} (plain squared error x {number(row.plain_validation, 4)})"
+        else:
+            yield reason
+
+
+def _blind_text(row: Ranked) -> str:
+    """From which size this recording would show a candidate that it hardly shows."""
+    if not isfinite(row.visible_from):
+        return "this recording cannot show it"
+    return f"seen here from {number(row.visible_from, 2)} times its typical size"
+
+
+def imitated_text(leader: Ranked) -> list[str]:
+    """What each of a tie would explain of the first of it."""
+    return [
+        f"if {leader.candidate.name} is the truth, {name} would explain {percent(share)} of it"
+        for name, share in leader.imitated_by.items()
+        if name in leader.tied_with
+    ]

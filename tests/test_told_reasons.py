@@ -1,0 +1,86 @@
+"""What a diagnosis says besides its verdict: why not, what strains the fit, what is not seen."""
+
+from dataclasses import replace
+from math import inf
+
+import pytest
+from test_report import LAG, LEAK, UNITS, diagnosis, ranked
+
+from studies.documents import diagnosis_document
+from studies.text_of_ranking import reasons
+from studies.text_of_results import diagnosis_text
+from workbench.diagnosis.judge import HELD_OUT_REASON, SHARE_REASON
+from workbench.diagnosis.result import Verdict
+from workbench.diagnosis.verdict import BLIND_SHOWN, unexplained
+from workbench.fitting.posterior import Moved
+
+FAR = ("slide.position 12 times its noise",)
+
+
+def refused(*why, train, held_out, plain=1.0):
+    row = ranked(LEAK, train)
+    return replace(row, drop_validation=held_out, plain_validation=plain, reasons=why)
+
+
+@pytest.mark.parametrize(
+    ("row", "told"),
+    [
+        (refused(SHARE_REASON, train=0.206, held_out=0.144), "(17.5 % as the mean of both sets)"),
+        (refused(SHARE_REASON, train=0.08, held_out=0.6), "(less than 10 % in training)"),
+        (
+            refused(HELD_OUT_REASON, train=0.2, held_out=0.176, plain=1.23),
+            "(plain squared error x 1.23)",
+        ),
+        (refused(HELD_OUT_REASON, train=0.2, held_out=-0.3, plain=1.5), ""),
+        (refused("its size is negligible", train=0.2, held_out=0.1), ""),
+    ],
+)
+def test_a_reason_that_a_share_beside_it_seems_to_contradict_says_its_number(row, told):
+    (said,) = reasons(row)
+    assert said == f"{row.reasons[0]} {told}".strip()
+
+
+def test_the_plain_error_stands_in_the_json():
+    found = diagnosis()
+    rows = (replace(found.ranking[0], plain_validation=0.4), *found.ranking[1:])
+    told = diagnosis_document(replace(found, ranking=rows), UNITS)["ranking"]
+    assert [each["plain_error_validation"] for each in told] == [0.4, None]
+
+
+def test_what_the_prior_fit_strains_is_told():
+    moved = Moved("command_delay.delay_s", 0.0, 0.012, 5e-4, 0.004)
+    found = replace(diagnosis(), strained=(moved,))
+
+    assert "command_delay.delay 0 s to 0.012 s (3 prior deviations)" in diagnosis_text(found, UNITS)
+    assert "suspects" not in diagnosis_text(diagnosis(), UNITS)
+    (told,) = diagnosis_document(found, UNITS)["strained"]
+    assert (told["name"], told["unit"]) == ("command_delay.delay", "s")
+    assert told["prior_deviations_moved"] == pytest.approx(3.0)
+
+
+def test_the_farthest_of_the_strained_come_first_and_the_rest_is_counted():
+    rows = [Moved(f"p{k}.mass_kg", 1.0, 1.0 + 0.01 * k, 0.1, 0.001) for k in range(7)]
+    text = diagnosis_text(replace(diagnosis(), strained=tuple(rows)), UNITS)
+    (line,) = (each for each in text.splitlines() if "suspects" in each)
+    assert line.index("p6.mass") < line.index("p5.mass") and line.endswith("and 3 more")
+    assert "p0.mass" not in line
+
+
+def test_a_no_beside_large_errors_names_what_the_recording_could_not_show():
+    blind = [replace(ranked(LAG, 0.1), visible_from=3.0)] * (BLIND_SHOWN + 2)
+    seen = replace(ranked(LEAK, 0.1), visible_from=0.2)
+
+    (told,) = unexplained(FAR, Verdict.NOTHING_MISSING, [seen, *blind])
+    assert told.startswith(f"unexplained errors remain on held-out windows: {FAR[0]}; ")
+    assert "would not show valve_lag" in told and "and 2 more" in told
+    assert "chamber_leak" not in told
+    (plain,) = unexplained(FAR, Verdict.NOTHING_MISSING, [seen])
+    assert plain.endswith(FAR[0])
+    assert unexplained(FAR, Verdict.FOUND, blind) == ()
+    assert unexplained((), Verdict.NOTHING_MISSING, blind) == ()
+
+
+def test_a_blind_candidate_says_so_after_its_reasons():
+    row = replace(refused(SHARE_REASON, train=0.1, held_out=0.1), visible_from=inf)
+    text = diagnosis_text(replace(diagnosis(Verdict.NOTHING_MISSING), ranking=(row,)), UNITS)
+    assert "(10.0 % as the mean of both sets); this recording cannot show it" in text
