@@ -226,6 +226,7 @@ def _where(where: Where) -> Document:
     walk = where.intensities
     return {
         "balance": where.balance,
+        "certain": where.certain,
         "by_balance": {name: plain(gain) for name, gain in where.by_balance.items()},
         "against": [
             {"variable": public_name(each.variable), "explains": plain(each.explains)}

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from studies.text import columns, number, percent, removed, shown, spread
 from studies.text_of_next_recording import next_recording_text
 from studies.text_of_ranking import imitated_text, ranking_text
+from workbench.diagnosis.result import LEAST_GAIN
 from workbench.fitting.posterior import FAR_MOVED
 from workbench.units import public_name
 
@@ -76,9 +77,11 @@ def where_text(found: Diagnosis) -> str:
     if gaining:
         lines = [f"where: {gaining} (log-likelihood gained by an unknown input)"]
     follows = [f"{public_name(d.variable)} {percent(d.explains)}" for d in where.against[:3]]
-    if follows:
+    if not where.certain:
+        lines.append(f"which is hardly more than chance: below {LEAST_GAIN:g} none is to be blamed")
+    elif follows:
         lines.append(f"missing term of {where.balance} follows {', '.join(follows)}")
-    lines += [] if where.memory is None else [_memory_text(*where.memory)]
+        lines += [] if where.memory is None else [_memory_text(*where.memory)]
     shares = [f"{name} {percent(share)}" for name, share in where.by_regime.items()][:4]
     left = f"error left by the prior fit (regimes overlap): {', '.join(shares)}"
     return "\n".join([*lines, *([left] if shares else [])])

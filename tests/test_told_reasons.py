@@ -80,6 +80,18 @@ def test_a_no_beside_large_errors_names_what_the_recording_could_not_show():
     assert unexplained((), Verdict.NOTHING_MISSING, blind) == ()
 
 
+def test_a_balance_that_gains_hardly_anything_is_not_blamed():
+    found = diagnosis()
+    gains = {"chamber_a.mass": 2.9, "slide.momentum": 0.4}
+    chance = replace(found, where=replace(found.where, by_balance=gains))
+
+    said = diagnosis_text(chance, UNITS)
+    assert "hardly more than chance" in said and "follows" not in said
+    assert diagnosis_document(chance, UNITS)["where"]["certain"] is False
+    assert "hardly more than chance" not in diagnosis_text(found, UNITS)
+    assert diagnosis_document(found, UNITS)["where"]["certain"] is True
+
+
 def test_a_blind_candidate_says_so_after_its_reasons():
     row = replace(refused(SHARE_REASON, train=0.1, held_out=0.1), visible_from=inf)
     text = diagnosis_text(replace(diagnosis(Verdict.NOTHING_MISSING), ranking=(row,)), UNITS)

@@ -30,6 +30,7 @@ class Verdict(Enum):
 
 
 BLIND = 1.0  # typical sizes: what is not seen there is not seen
+LEAST_GAIN = 4.0  # of log-likelihood: 55 to 1; with less a balance is named by chance
 NAMING = (Verdict.FOUND, Verdict.TIE, Verdict.SMALL_PROXY)
 
 
@@ -169,6 +170,11 @@ class Where:
     imitated: float = 0.0
     rest: np.ndarray | None = field(default=None, repr=False)
     course: Course | None = field(default=None, repr=False)
+
+    @property
+    def certain(self) -> bool:
+        """True where the balance gains more than chance gives."""
+        return self.by_balance.get(self.balance, 0.0) > LEAST_GAIN
 
     @property
     def memory(self) -> tuple[Dependence, Loop] | None:
