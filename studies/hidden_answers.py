@@ -119,16 +119,22 @@ def counted(
     """How many of the hidden effects were accepted, and how many effects that are not there.
 
     An effect stands for the one hidden effect that it was tied with in its round, if it is no
-    hidden one itself.  The small differences that every truth has are there.
+    hidden one itself.  The small differences that every truth has are there, and what was tied
+    with one of them stands for that one alike, once.
     """
     left = [name for name in hidden if name not in kept]
+    stood_for = [name for name in kept if bench.always_has(name)]
     wrong = 0
-    for name in kept:
-        alike = [other for other in tied.get(name, ()) if other in left]
-        if name in hidden:
+    for name in (each for each in kept if each not in hidden):
+        alike = tied.get(name, ())
+        own = [other for other in alike if other in left]
+        there = [o for o in alike if bench.always_has(o) and o not in stood_for]
+        if own:
+            left.remove(own[0])
+        elif name in stood_for:
             continue
-        if alike:
-            left.remove(alike[0])
-        elif not bench.always_has(name):
+        elif there:
+            stood_for.append(there[0])
+        else:
             wrong += 1
     return len(hidden) - len(left), wrong

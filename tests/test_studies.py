@@ -163,6 +163,19 @@ def test_one_law_of_six_may_be_missed_but_not_its_balance():
     assert claim.holds and claim.found == "6 of 6 (100%); on other plants 1 of 2"
 
 
+def test_what_was_accepted_may_stand_for_a_small_difference_that_it_was_tied_with_once():
+    """A tie that names what is there is no false name, for a pair as for a single effect."""
+    tied = {name: ("command_delay",) for name in ("line_delay", "valve_offset", "command_delay")}
+
+    def of(*kept):
+        return counted(kept, tied, ("constant_force", "stiction"), SERVO_DRIVE)
+
+    assert of("constant_force", "stiction", "line_delay") == (2, 0)
+    assert of("stiction", "line_delay", "valve_offset") == (1, 1)
+    assert of("stiction", "line_delay", "command_delay") == (1, 1)  # that one is there by itself
+    assert of("stiction", "spring_force") == (1, 1)
+
+
 def test_other_priors_are_held_against_the_answer_of_the_same_case():
     effects = [row(seed=k) for k in range(10)]
     wide = [replace(each, kind=Kind.WIDTH) for each in effects]
