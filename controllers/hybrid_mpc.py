@@ -43,6 +43,7 @@ from workbench.errors import InputError, Message
 
 SURE = 3.0  # standard deviations beyond which a speed is no noise
 VALVES = ("valve_1", "valve_2")
+LOST_M = 2e-3  # no bounce goes as far: what is further off a position that it met has left it
 NEAR_M = 1e-3  # a reference this near to a dedicated position means that position
 
 
@@ -177,12 +178,14 @@ class HybridMpc:
     def _towards(self, target_m: float, memory: ShiftMemory, place_m: float) -> ShiftMemory:
         """The memory with this target and whether it was met.
 
-        A new one begins with the plans from the nearest position.  Full drive is the last of them:
-        it is what is left if valves have just been switched.
+        What bounces off an end has met it; what is pushed away further is on its way again.  A new
+        target begins with the plans from the nearest position.  Full drive is the last of them: it
+        is what is left if valves have just been switched.
         """
-        near = abs(place_m - target_m) < self.spec.within_m
+        off_m = abs(place_m - target_m)
+        near = off_m < self.spec.within_m
         if target_m == memory.target_m:
-            return replace(memory, met=memory.met or near)
+            return replace(memory, met=near or (memory.met and off_m < LOST_M))
         full = self._full_drive(target_m, memory.sent)[None]
         nearest_m = min(self.drives, key=lambda start_m: abs(start_m - place_m))
         known = np.concatenate([self.launches.get((nearest_m, target_m), full[:0]), full])
