@@ -29,13 +29,15 @@ from workbench.fitting.start_states import refit_starts
 from workbench.fitting.window_length import window_length_s
 from workbench.fitting.windows import TooShortError, Windows, cut_windows
 from workbench.plant import Plant
+from workbench.plant_filter import PlantFilter
 from workbench.recording import Recording
 from workbench.simulation import simulate
 
 ONE_STEP, WINDOW, FREE_RUN, PLAIN = "one step", "window", "free run", "sample by sample"
 JUDGED = (WINDOW, PLAIN, FREE_RUN, ONE_STEP)  # the first there is tells where the error is
 PROCESS_SHARE = 0.1  # of a state's scale per square root of a second, in the one-step filter
-FARTHER = 1.5  # times the squared error of a free run: a filter at its noise is no further off
+FARTHER = 1.5  # times the squared error of a free run
+UNEXPECTED = 4.0  # times the variance that the filter expects of its own innovations
 ASTRAY = "one step: the filter is further off than a free run: it has lost the state"
 
 Rows = Mapping[str, np.ndarray]
@@ -92,12 +94,15 @@ def _followed(
     course: Course, noise: Mapping[str, float], free: Rows | None
 ) -> tuple[FilterResult, list[str]]:
     """The filter over the recording, and in words where the careful one goes astray too."""
-    filtered = _filtered(course, noise)
-    if not free or not _astray(course.recording, filtered, free):
+    recording, whole = course.recording, _filter(course, noise)
+    filtered = filter_pass(whole, recording, course.states)
+    if not free or not _astray(recording, filtered, free):
         return filtered, []
-    careful = _filtered(course, noise, beside_measured(course.plant))
-    likelier = max(filtered, careful, key=_likely)
-    return likelier, [ASTRAY] if _astray(course.recording, likelier, free) else []
+    careful = replace(whole, considered=beside_measured(course.plant))
+    if (careful.corrected != whole.corrected).any():
+        other = filter_pass(careful, recording, course.states)
+        filtered = max(filtered, other, key=_likely)
+    return filtered, [ASTRAY] if _astray(recording, filtered, free) else []
 
 
 def beside_measured(plant: Plant) -> tuple[str, ...]:
@@ -107,11 +112,17 @@ def beside_measured(plant: Plant) -> tuple[str, ...]:
 
 
 def _astray(recording: Recording, filtered: FilterResult, free: Rows) -> bool:
-    """True where an output is foretold worse from the sample before than from the first one."""
-    for name, innovation in zip(filtered.measured, filtered.innovations, strict=True):
+    """True where an output is foretold worse from the sample before than from the first one.
+
+    And far worse than the filter itself expects: what follows the noise of a good sensor is a
+    little further off than a free run of a plant that is right.
+    """
+    rows = zip(filtered.measured, filtered.innovations, filtered.normalised, strict=True)
+    for name, innovation, normalised in rows:
         both = np.isfinite(innovation) & np.isfinite(recording[name] - free[name])
         missed = recording[name][both] - free[name][both]
-        if np.sum(innovation[both] ** 2) > FARTHER * np.sum(missed**2):
+        farther = np.sum(innovation[both] ** 2) > FARTHER * np.sum(missed**2)
+        if farther and np.sum(normalised[both] ** 2) > UNEXPECTED * both.sum():
             return True
     return False
 
@@ -121,23 +132,20 @@ def _likely(filtered: FilterResult) -> float:
     return likely if np.isfinite(likely) else -np.inf
 
 
-def _filtered(
-    course: Course, noise: Mapping[str, float], considered: tuple[str, ...] = ()
-) -> FilterResult:
-    """The filter over the recording.
+def _filter(course: Course, noise: Mapping[str, float]) -> PlantFilter:
+    """The filter of a recording.
 
     It starts where the recording is: from the plant's own initial state a link or a stop
     would be strained, and a gas mass known no better than its scale becomes any temperature.
     """
     plant, recording = course.plant, course.recording
-    known = recording_filter(
+    return recording_filter(
         plant,
         recording,
         measurement_noise=noise,
         process_noise=dict(zip(plant.model.states, PROCESS_SHARE * plant.scale, strict=True)),
         initial_deviation=dict(zip(plant.model.states, course.deviations[:, 0], strict=True)),
     )
-    return filter_pass(replace(known, considered=considered), recording, course.states)
 
 
 def _one_step(recording: Recording, found: FilterResult) -> Rows:
