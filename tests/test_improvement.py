@@ -264,3 +264,20 @@ def test_a_pair_hides_both_effects_and_no_larger_difference_than_either_case(nam
 def test_two_effects_of_one_quantity_are_no_pair():
     with pytest.raises(ValueError, match="both set coulomb_n"):
         stored_pair("coulomb_friction", "coulomb_friction", 1)
+
+
+def test_forms_of_what_was_absent_are_not_far_from_a_belief(rig):
+    """A fit begins a wave along the stroke anywhere; nobody believed it to have that phase."""
+
+    def wavy(velocity):
+        position = 0.01 * np.cumsum(velocity)
+        return coulomb(velocity) * (1.0 + 0.6 * np.sin(2.0 * np.pi * position / 0.05))
+
+    found = improve(rig, [bench(1, wavy)], [bench(2, wavy, gauge_pa=4e5)])
+    rows = {row.name: row for row in found.parameters}
+
+    assert "friction_position" in found.kept
+    for name in ("friction.wavelength_m", "friction.phase_rad"):
+        assert np.isnan(rows[name].far) and not np.isfinite(rows[name].prior_deviation)
+    others = [row for name, row in rows.items() if not name.startswith("friction.")]
+    assert others and all(np.isfinite(row.far) for row in others)

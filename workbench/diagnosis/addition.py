@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 
 from workbench.candidate import TOGETHER, Candidate
 from workbench.consistency import checked
+from workbench.diagnosis.absent import is_new
 from workbench.diagnosis.diagnose import Progress, silent
 from workbench.diagnosis.evidence import WARNINGS, Recordings, held_out, weighed
 from workbench.diagnosis.law import empirical_law, plant_with_terms
@@ -253,13 +254,6 @@ def freed(rig: Rig, step: Addition, own: Iterable[str] | None = None) -> Rig:
     known = dict(zip(unknowns.names, posterior_deviation(fit).tolist(), strict=True))
     loosened = {**rig.deviations, **{n: known[n] for n in free if known[n] > 0.0}}
     return replace(rig, plant=plant, deviations=loosened)
-
-
-def is_new(rig: Rig, candidate: Candidate) -> bool:
-    """True for a cause that is absent from the rig's plant, not a shift of what it has."""
-    known = rig.plant.parameters[candidate.strength]
-    absent = rig.plant.values.get(candidate.strength, known.null) == known.null
-    return candidate.held is None and absent
 
 
 def addition(

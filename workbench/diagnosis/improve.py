@@ -16,6 +16,7 @@ from math import inf
 
 from workbench.comparison.free_run import free_run_errors
 from workbench.consistency import checked
+from workbench.diagnosis.absent import unknown_forms
 from workbench.diagnosis.addition import (
     Addition,
     accept,
@@ -160,7 +161,9 @@ def _improvement(
             done = done.marked("all of it", fit, held_out, Change.FITTED)
         final = fitted_rig(assembled(done.rig, done.kept.steps), fit)
     if final is not done.rig:
-        parameters = tuple(_counted_from(done.rig, row) for row in moved_parameters(fit))
+        added = unknown_forms(done.rig, (step.candidate for step in done.steps))
+        moved = moved_parameters(fit, added)
+        parameters = tuple(r if r.name in added else _counted_from(done.rig, r) for r in moved)
     sets, windows = {"train": train, "validation": validation}, fit.windows
     noise = dict(zip(windows.plant.measured, windows.noise.tolist(), strict=True))
     free: tuple[Errors, Errors] = {}, {}
