@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from math import isfinite
 from typing import TYPE_CHECKING, Any
 
+from studies.plain import plain
 from studies.shift_cases import case_deviations
 from studies.text_of_next_recording import conduct_document
 from workbench.diagnosis.result import told
@@ -165,11 +165,6 @@ def signal(error: SignalError, name: str) -> Document:
         "left_out": error.left_out,
         "left_out_from": vars(error.left_out_from) if error.left_out_from else None,
     }
-
-
-def plain(value: float) -> float | None:
-    """A float that JSON knows; what is not finite is null."""
-    return float(value) if isfinite(value) else None
 
 
 def moved_document(row: Moved) -> Document:

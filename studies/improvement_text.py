@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from studies.documents import Document, errors, law_document, moved_document, plain
+from studies.documents import Document, errors, law_document, moved_document
+from studies.plain import plain
 from studies.text import columns, number, removed
 from studies.text_of_results import errors_over, law_text, moved_text, windows_text
 from workbench.diagnosis.improvement import Change

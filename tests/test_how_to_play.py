@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from conftest import PLANT_MODELS
 
-from studies.documents import plain
+from studies.plain import plain
 from studies.text_of_next_recording import conduct_document, conduct_lines, instructions
 from workbench.diagnosis.result import NextRecording
 from workbench.manoeuvres.conduct import conduct
@@ -17,6 +17,7 @@ from workbench.recording import Recording
 
 PLACE, A = "slide.position_m", "chamber_a.pressure_pa"
 DRIVE, TANK = PLANT_MODELS["servo_drive"], PLANT_MODELS["servo_reservoir"]
+ROD_M = "rod.position_m"
 LOW_M, HIGH_M = 0.0, 0.290
 
 
@@ -42,7 +43,7 @@ def known():
     assert axis.stops == (LOW_M, HIGH_M)
     predicted = [going(0.145, LOW_M, LOW_M, HIGH_M), going(0.145, LOW_M, LOW_M, 0.2)]
     speeds = SpeedMap(np.array([-0.5, 0.0, 0.5]), np.array([4.0, 4.95, 6.0]))
-    return conduct(limits, DRIVE.measured, predicted, recorded, [speeds])
+    return conduct(limits, DRIVE, predicted, recorded, [speeds])
 
 
 def test_it_starts_where_predictions_do_and_meets_stops_as_fast_as_any_rival(known):
@@ -58,7 +59,10 @@ def test_start_stops_and_loop_are_told(known):
     start, stops, loop = conduct_lines(asked)
 
     assert start == "it starts with slide.position at 145 mm (recordings start at 60 mm, 70 mm)"
-    assert "slide.position 0 mm at up to 0.15 m/s and slide.position 290 mm at up to 0.29" in stops
+    assert stops == (
+        "it comes to stops: slide.position to or within 0.87 mm of 0 mm at up to 0.15 m/s and "
+        "slide.position to or within 0.87 mm of 290 mm at up to 0.29 m/s, as predicted"
+    )
     assert "dr/dt + w (r - y), w = 6 rad/s" in loop and "drift" in loop
     table = instructions(asked).splitlines()[-4:]
     assert table[0].split("  ")[0] == "valve.command (V)"
@@ -75,15 +79,78 @@ def test_how_it_is_played_stands_in_the_document_in_si(known):
         "unit": "m",
     }
     assert [each["speed_unit"] for each in told["contacts"]] == ["m/s", "m/s"]
+    assert [each["within"] for each in told["contacts"]] == pytest.approx([0.87e-3, 0.87e-3])
     assert told["loop"]["bandwidth_rad_s"] == plain(BANDWIDTH_RAD_S)
     assert told["loop"]["speed_maps"]["slide.position"]["command"] == [4.0, 4.95, 6.0]
 
 
 def test_commands_that_move_no_position_have_starts_of_all_outputs_and_no_loop():
     recorded = Recording("made up", 1e-3, constants(TANK, 2000))
-    known = conduct(limits_of(TANK, [recorded]), TANK.measured, [recorded], [recorded])
+    known = conduct(limits_of(TANK, [recorded]), TANK, [recorded], [recorded])
 
     assert list(known.starts) == list(TANK.measured)
     assert (known.contacts, known.loop) == ((), None)
     told = conduct_lines(NextRecording("go", ("one", "other"), 9.0, conduct=known))
     assert told == ["it starts with reservoir.pressure at 5 bar"]
+
+
+@pytest.mark.parametrize(
+    ("name", "output", "stops"),
+    [
+        ("vertical_cylinder", ROD_M, (0.0, 0.1078)),
+        ("gearbox", "main_piston.position_m", (-12e-3, 12e-3)),
+    ],
+)
+def test_stops_of_a_plant_whose_commands_move_no_position_are_told_as_well(name, output, stops):
+    plant = PLANT_MODELS[name]
+    way_m = np.interp(np.arange(2000), (0, 900, 1900), (sum(stops) / 2, *stops))
+    recorded = Recording("made up", 1e-3, constants(plant, 2000) | {output: way_m})
+    limits = limits_of(plant, [recorded])
+
+    known = conduct(limits, plant, [recorded], [recorded])
+
+    assert not limits.axes
+    assert [(each.output, each.at) for each in known.contacts] == [(output, stop) for stop in stops]
+
+
+def test_a_body_that_stops_short_of_a_stop_is_not_said_to_run_into_it():
+    short = going(0.145, 0.8e-3, 0.8e-3)
+    near, far = (
+        conduct(limits_of(DRIVE, [short]), DRIVE, [each], [short])
+        for each in (short, going(0.145, 0.9e-3, 0.9e-3))
+    )
+
+    (told,) = conduct_lines(NextRecording("go", ("one", "other"), 9.0, conduct=near))[1:]
+    assert told.startswith("it comes to stops: slide.position to or within 0.87 mm of 0 mm at")
+    assert not far.contacts
+
+
+def test_a_recording_without_values_has_no_start_in_words_and_null_in_the_document():
+    nowhere = {PLACE: np.full(1000, np.nan)}
+    blank = Recording("made up", 1e-3, constants(DRIVE, 1000) | nowhere)
+    recorded = [blank, going(0.05, 0.2)]
+    known = conduct(limits_of(DRIVE, recorded[1:]), DRIVE, [going(0.145, 0.2)], recorded)
+    alone = replace(known, starts={PLACE: replace(known.starts[PLACE], recorded=(np.nan,))})
+
+    first, only = (
+        conduct_lines(NextRecording("go", ("one", "other"), 9.0, conduct=each))[0]
+        for each in (known, alone)
+    )
+    assert first == "it starts with slide.position at 145 mm (recordings start at 50 mm)"
+    assert only == "it starts with slide.position at 145 mm"
+    assert conduct_document(known)["starts"]["slide.position"]["recordings"] == [None, 0.05]
+
+
+def test_what_is_not_finite_is_null_in_the_document(known):
+    """Else the file could not be written, after all the work."""
+    odd = replace(
+        known,
+        starts={PLACE: replace(known.starts[PLACE], at=np.nan)},
+        contacts=(replace(known.contacts[0], speed=np.nan),),
+        loop=replace(known.loop, maps={PLACE: SpeedMap(np.array([np.nan]), np.array([np.nan]))}),
+    )
+
+    told = json.loads(json.dumps(conduct_document(odd), allow_nan=False))
+
+    assert told["starts"]["slide.position"]["at"] is told["contacts"][0]["speed"] is None
+    assert told["loop"]["speed_maps"]["slide.position"] == {"command": [None], "speed": [None]}
