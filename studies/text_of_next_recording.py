@@ -11,10 +11,14 @@ from workbench.units import display_unit, public_name, si_unit, suffix
 
 if TYPE_CHECKING:
     from workbench.diagnosis.result import NextRecording
-    from workbench.manoeuvres.conduct import Conduct, Start
+    from workbench.manoeuvres.conduct import Conduct, Loop, Start
 
 SPEED = {"m": "velocity_m_s", "rad": "velocity_rad_s"}  # of a position by its suffix
 TOLD_STARTS = 3  # of recordings
+LAW = (
+    "speed dr/dt + w (r - y), limited to plus and minus `fastest` and given by the speed map, "
+    "renewed every `update_s`; within `rest_within` of a resting reference the resting command"
+)
 OPEN_LOOP = "the commands of the file alone, played without that loop, drift away"
 
 
@@ -43,12 +47,23 @@ def conduct_lines(asked: NextRecording) -> list[str]:
         )
         lines.append(f"it comes to stops: {met}, as predicted")
     if known.loop:
-        lines.append(
-            "its loop gives the command that moves the plant at dr/dt + w (r - y), "
-            f"w = {number(known.loop.bandwidth_rad_s, 2)} rad/s, and the resting command where a "
-            f"resting reference is reached; {OPEN_LOOP}"
-        )
+        lines.append(_loop(known.loop))
     return lines
+
+
+def _loop(loop: Loop) -> str:
+    """The position loop that it was rehearsed with."""
+    limited = " and ".join(
+        f"{public_name(output)} limited to ±{shown(fastest, _speed(output), 3)}, at rest within "
+        f"{shown(loop.rest_within[output], output, 2)} of a resting reference"
+        for output, fastest in loop.fastest.items()
+    )
+    return (
+        "its loop gives the command that moves the plant at dr/dt + w (r - y), "
+        f"w = {number(loop.bandwidth_rad_s, 2)} rad/s, renewed every "
+        f"{number(1e3 * loop.update_s, 3)} ms, {limited}, where it gives the resting command; "
+        f"{OPEN_LOOP}"
+    )
 
 
 def _start(name: str, each: Start) -> str:
@@ -108,17 +123,30 @@ def conduct_document(known: Conduct) -> dict[str, Any]:
             }
             for each in known.contacts
         ],
-        "loop": {
-            "law": "speed dr/dt + w (r - y), given by the speed map; at a resting reference rest",
-            "bandwidth_rad_s": plain(loop.bandwidth_rad_s),
-            "speed_maps": {
-                public_name(output): {
-                    "command": [plain(value) for value in speeds.command],
-                    "speed": [plain(value) for value in speeds.speed],
-                }
-                for output, speeds in loop.maps.items()
-            },
-        }
-        if loop
-        else None,
+        "loop": _loop_document(loop) if loop else None,
+    }
+
+
+def _loop_document(loop: Loop) -> dict[str, Any]:
+    """The position loop, its axes by public name."""
+    return {
+        "law": LAW,
+        "bandwidth_rad_s": plain(loop.bandwidth_rad_s),
+        "update_s": plain(loop.update_s),
+        "axes": {
+            public_name(output): {
+                "fastest": plain(fastest),
+                "speed_unit": si_unit(_speed(output)),
+                "rest_within": plain(loop.rest_within[output]),
+                "unit": si_unit(output),
+            }
+            for output, fastest in loop.fastest.items()
+        },
+        "speed_maps": {
+            public_name(output): {
+                "command": [plain(value) for value in speeds.command],
+                "speed": [plain(value) for value in speeds.speed],
+            }
+            for output, speeds in loop.maps.items()
+        },
     }

@@ -12,7 +12,7 @@ from studies.text_of_next_recording import conduct_document, conduct_lines, inst
 from workbench.diagnosis.result import NextRecording
 from workbench.manoeuvres.conduct import conduct
 from workbench.manoeuvres.limits import limits_of
-from workbench.manoeuvres.rehearse import BANDWIDTH_RAD_S, SpeedMap
+from workbench.manoeuvres.rehearse import BANDWIDTH_RAD_S, SpeedMap, _loop
 from workbench.recording import Recording
 
 PLACE, A = "slide.position_m", "chamber_a.pressure_pa"
@@ -29,6 +29,12 @@ def going(*places_m, sample_time_s=1e-3):
     return Recording("made up", sample_time_s, constants(DRIVE, len(time_s)) | rows)
 
 
+def without_first(recording):
+    """The same with the first sample of the position missing, which comes 0.06 mm later."""
+    place_m = np.where(np.arange(len(recording)) == 0, np.nan, recording[PLACE])
+    return replace(recording, channels={**recording.channels, PLACE: place_m})
+
+
 def constants(plant, n):
     names = (*plant.commands, *plant.measured_inputs)
     rows = {signal.name: np.full(n, signal.nominal) for signal in names}
@@ -37,17 +43,18 @@ def constants(plant, n):
 
 @pytest.fixture(scope="module")
 def known():
-    recorded = [going(0.06, 0.12), going(0.07, 0.20)]
+    recorded = [without_first(going(0.06, 0.12)), going(0.07, 0.20)]
     limits = limits_of(DRIVE, recorded)
     (axis,) = limits.axes
     assert axis.stops == (LOW_M, HIGH_M)
-    predicted = [going(0.145, LOW_M, LOW_M, HIGH_M), going(0.145, LOW_M, LOW_M, 0.2)]
+    predicted = [going(0.145, LOW_M, LOW_M, HIGH_M), going(0.15, 0.07, LOW_M, 0.2)]
     speeds = SpeedMap(np.array([-0.5, 0.0, 0.5]), np.array([4.0, 4.95, 6.0]))
     return conduct(limits, DRIVE, predicted, recorded, [speeds])
 
 
 def test_it_starts_where_predictions_do_and_meets_stops_as_fast_as_any_rival(known):
-    assert (known.starts[PLACE].at, known.starts[PLACE].recorded) == (0.145, (0.06, 0.07))
+    assert known.starts[PLACE].at == 0.145
+    assert known.starts[PLACE].recorded == pytest.approx((0.06006, 0.07))
     assert [each.at for each in known.contacts] == [LOW_M, HIGH_M]
     assert known.contacts[0].speed == pytest.approx(0.145, rel=1e-6)
     assert known.contacts[1].speed == pytest.approx(0.290, rel=1e-6)
@@ -58,12 +65,18 @@ def test_start_stops_and_loop_are_told(known):
     asked = NextRecording("go", ("one", "other"), 9.0, commands=("valve.command_v",), conduct=known)
     start, stops, loop = conduct_lines(asked)
 
-    assert start == "it starts with slide.position at 145 mm (recordings start at 60 mm, 70 mm)"
+    assert start == "it starts with slide.position at 145 mm (recordings start at 60.06 mm, 70 mm)"
     assert stops == (
         "it comes to stops: slide.position to or within 0.87 mm of 0 mm at up to 0.15 m/s and "
         "slide.position to or within 0.87 mm of 290 mm at up to 0.29 m/s, as predicted"
     )
-    assert "dr/dt + w (r - y), w = 6 rad/s" in loop and "drift" in loop
+    assert loop == (
+        "its loop gives the command that moves the plant at dr/dt + w (r - y), w = 6 rad/s, "
+        "renewed every 20 ms, slide.position limited to ±0.13 m/s, at rest within 0.7 mm of a "
+        "resting reference, where it gives the resting command; the commands of the file alone, "
+        "played without that loop, drift away"
+    )
+    assert loop in instructions(asked).splitlines()
     table = instructions(asked).splitlines()[-4:]
     assert table[0].split("  ")[0] == "valve.command (V)"
     assert [line.split() for line in table[1:]] == [["4", "-0.5"], ["4.95", "0"], ["6", "0.5"]]
@@ -75,12 +88,20 @@ def test_how_it_is_played_stands_in_the_document_in_si(known):
 
     assert told["starts"]["slide.position"] == {
         "at": 0.145,
-        "recordings": [0.06, 0.07],
+        "recordings": pytest.approx([0.06006, 0.07]),
         "unit": "m",
     }
     assert [each["speed_unit"] for each in told["contacts"]] == ["m/s", "m/s"]
     assert [each["within"] for each in told["contacts"]] == pytest.approx([0.87e-3, 0.87e-3])
     assert told["loop"]["bandwidth_rad_s"] == plain(BANDWIDTH_RAD_S)
+    assert told["loop"]["update_s"] == 0.02
+    assert told["loop"]["axes"]["slide.position"] == {
+        "fastest": pytest.approx(0.13),
+        "speed_unit": "m/s",
+        "rest_within": pytest.approx(0.7e-3, rel=2e-3),
+        "unit": "m",
+    }
+    assert "limited to plus and minus `fastest`" in told["loop"]["law"]
     assert told["loop"]["speed_maps"]["slide.position"]["command"] == [4.0, 4.95, 6.0]
 
 
@@ -92,6 +113,22 @@ def test_commands_that_move_no_position_have_starts_of_all_outputs_and_no_loop()
     assert (known.contacts, known.loop) == ((), None)
     told = conduct_lines(NextRecording("go", ("one", "other"), 9.0, conduct=known))
     assert told == ["it starts with reservoir.pressure at 5 bar"]
+
+
+def test_the_loop_that_is_told_is_the_one_that_was_rehearsed():
+    """Resting references 1 m away, a little more than ``rest_within`` and a little less."""
+    recorded = going(0.06, 0.20)
+    limits = limits_of(DRIVE, [recorded])
+    (axis,) = limits.axes
+    speeds = SpeedMap(np.array([-0.5, 0.0, 0.5]), np.array([4.0, 4.9, 6.0]))
+    loop = conduct(limits, DRIVE, [recorded], [recorded], [speeds]).loop
+    errors_m = np.array([-1.0, 1.01 * loop.rest_within[PLACE], 0.99 * loop.rest_within[PLACE]])
+
+    given = _loop(limits, axis, speeds, np.zeros((3, 100)), -errors_m, 0)
+
+    wanted = np.array([-loop.fastest[PLACE], loop.bandwidth_rad_s * errors_m[1]])
+    assert given[:2] == pytest.approx(speeds.command_for(wanted))
+    assert given[2] == limits.commands[0].nominal
 
 
 @pytest.mark.parametrize(

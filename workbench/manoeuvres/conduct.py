@@ -15,7 +15,7 @@ from math import isfinite
 import numpy as np
 
 from workbench.manoeuvres.limits import SPEED_SAMPLES, Limits, stops_of
-from workbench.manoeuvres.rehearse import SpeedMap, bandwidth_rad_s
+from workbench.manoeuvres.rehearse import SpeedMap, bandwidth_rad_s, rest_within, update_s
 from workbench.plant import Plant
 from workbench.recording import Recording
 
@@ -47,11 +47,25 @@ class Contact:
 class Loop:
     """The position loop: v = dr/dt + w (r - y), and the command that gives this speed.
 
-    ``maps`` are the speed maps by output of the axis; w is in rad/s.
+    Attributes
+    ----------
+    bandwidth_rad_s
+        w.
+    update_s
+        From one command to the next.
+    maps
+        The speed maps, here and below by output of the axis.
+    fastest
+        What v is limited to either way, in m/s or rad/s.
+    rest_within
+        How near to a resting reference the resting command is given, in m or rad.
     """
 
     bandwidth_rad_s: float
+    update_s: float
     maps: Mapping[str, SpeedMap]
+    fastest: Mapping[str, float]
+    rest_within: Mapping[str, float]
 
 
 @dataclass(frozen=True)
@@ -85,13 +99,23 @@ def conduct(
     ``predicted`` are the rivals' recordings, the likeliest first; ``maps`` those of the axes where
     a loop acts, in their order.
     """
-    axes = [axis.output for axis in limits.axes]
     first = predicted[0]
-    names = axes or plant.measured
+    names = [axis.output for axis in limits.axes] or plant.measured
     return Conduct(
         starts={n: Start(float(first[n][0]), tuple(_first(r[n]) for r in recorded)) for n in names},
         contacts=tuple(c for n in plant.measured for c in _contacts(n, plant, predicted)),
-        loop=Loop(bandwidth_rad_s(limits), dict(zip(axes, maps, strict=True))) if maps else None,
+        loop=_loop(limits, maps) if maps else None,
+    )
+
+
+def _loop(limits: Limits, maps: Sequence[SpeedMap]) -> Loop:
+    """The loop as it was rehearsed."""
+    return Loop(
+        bandwidth_rad_s(limits),
+        update_s(limits),
+        maps={axis.output: speeds for axis, speeds in zip(limits.axes, maps, strict=True)},
+        fastest={axis.output: axis.speed for axis in limits.axes},
+        rest_within={axis.output: rest_within(axis) for axis in limits.axes},
     )
 
 
