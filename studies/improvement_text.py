@@ -148,7 +148,7 @@ def improvement_document(found: Improvement, unit_of: Mapping[str, str]) -> Docu
         "before": errors(found.before, unit_of),
         "after": errors(found.after, unit_of),
         "free_run": {
-            "before": errors(found.free_before, unit_of),
+            "as_it_came": errors(found.free_before, unit_of),
             "after": errors(found.free_after, unit_of),
         },
         "parameters": [moved_document(row) for row in found.parameters],
