@@ -1,4 +1,4 @@
-"""How the next recording is played: where it starts, what it runs into, and in which loop."""
+"""How the next recording is played: where it starts, which stops it comes to, in which loop."""
 
 import json
 from dataclasses import replace
