@@ -28,7 +28,7 @@ from studies.figures.summary import summary_figure
 from studies.modes_text import modes_text
 from studies.report.page import FIGURES, Section, write_report
 from studies.text_of_comparison import comparison_text
-from studies.text_of_results import addition_text, diagnosis_text, unit_names
+from studies.text_of_results import ADDED, addition_text, diagnosis_text, unit_names
 from workbench.comparison import compare
 from workbench.diagnosis.diagnose import diagnose
 from workbench.diagnosis.improve import accept
@@ -130,7 +130,7 @@ def _add(story: Story, rig: Rig, found: Diagnosis) -> Rig:
     added = accept(rig, found)
     name = added.candidate.name
     text = f"{name} is added and fitted with the uncertain parameters; validation is predicted."
-    figures = {"before_and_after": before_after_figure(added.before, added.after, units)}
+    figures = {"before_and_after": before_after_figure(added.before, added.after, units, ADDED)}
     story.tell(f"Errors before and after {name}", text, addition_text(added, units), figures)
     return added.rig
 

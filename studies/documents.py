@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from math import isfinite
 from typing import TYPE_CHECKING, Any
 
-from studies.shift_cases import case_deviations
+from studies.plain import plain
+from studies.shift_cases import case_deviations, mean_deviations
 from studies.text_of_next_recording import conduct_document
 from workbench.diagnosis.result import told
 from workbench.units import public_name, si_unit
@@ -27,17 +27,19 @@ Document = dict[str, Any]
 def comparison_document(found: Comparison) -> Document:
     """A comparison: errors by horizon and signal, regimes, worst windows, gear shifts.
 
-    ``shift_cases`` holds the shifts of all recordings by case, as Table I of paper 003.
+    ``shift_cases`` holds the shifts of all recordings by case, as Table I of paper 003, and
+    ``shift_cases_mean`` the mean of its cases.
     """
-    shifts = [shift for each in found.recordings for shift in each.shifts]
+    cases = case_deviations([shift for each in found.recordings for shift in each.shifts])
     return {
         "schema": "workbench.comparison/1",
         "rig": found.rig_name,
         "recordings": [_compared(each) for each in found.recordings],
         "shift_cases": [
             {"case": e.case, "shifts": e.shifts, "deviation": _deviations(e.deviations)}
-            for e in case_deviations(shifts)
+            for e in cases
         ],
+        "shift_cases_mean": _deviations(mean_deviations(cases)),
     }
 
 
@@ -165,11 +167,6 @@ def signal(error: SignalError, name: str) -> Document:
         "left_out": error.left_out,
         "left_out_from": vars(error.left_out_from) if error.left_out_from else None,
     }
-
-
-def plain(value: float) -> float | None:
-    """A float that JSON knows; what is not finite is null."""
-    return float(value) if isfinite(value) else None
 
 
 def moved_document(row: Moved) -> Document:

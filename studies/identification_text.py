@@ -7,7 +7,8 @@ from functools import partial
 from math import isfinite, nan
 from textwrap import fill
 
-from studies.documents import Document, plain
+from studies.documents import Document
+from studies.plain import plain
 from studies.text import columns, shown
 from workbench.errors import InputError, Message, listed, nearest
 from workbench.identification import PROCEDURES

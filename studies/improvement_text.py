@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from studies.documents import Document, errors, law_document, moved_document, plain
+from studies.documents import Document, errors, law_document, moved_document
+from studies.plain import plain
 from studies.text import columns, number, removed
 from studies.text_of_results import errors_over, law_text, moved_text, windows_text
 from workbench.diagnosis.improvement import Change
@@ -147,7 +148,7 @@ def improvement_document(found: Improvement, unit_of: Mapping[str, str]) -> Docu
         "before": errors(found.before, unit_of),
         "after": errors(found.after, unit_of),
         "free_run": {
-            "before": errors(found.free_before, unit_of),
+            "as_it_came": errors(found.free_before, unit_of),
             "after": errors(found.free_after, unit_of),
         },
         "parameters": [moved_document(row) for row in found.parameters],

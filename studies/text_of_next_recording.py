@@ -5,15 +5,20 @@ from __future__ import annotations
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
+from studies.plain import plain
 from studies.text import columns, number, shown
 from workbench.units import display_unit, public_name, si_unit, suffix
 
 if TYPE_CHECKING:
     from workbench.diagnosis.result import NextRecording
-    from workbench.manoeuvres.conduct import Conduct, Start
+    from workbench.manoeuvres.conduct import Conduct, Loop, Start
 
 SPEED = {"m": "velocity_m_s", "rad": "velocity_rad_s"}  # of a position by its suffix
 TOLD_STARTS = 3  # of recordings
+LAW = (
+    "speed dr/dt + w (r - y), limited to plus and minus `fastest` and given by the speed map, "
+    "renewed every `update_s`; within `rest_within` of a resting reference the resting command"
+)
 OPEN_LOOP = "the commands of the file alone, played without that loop, drift away"
 
 
@@ -28,7 +33,7 @@ def next_recording_text(asked: NextRecording) -> str:
 
 
 def conduct_lines(asked: NextRecording) -> list[str]:
-    """Where it starts, what it runs into and what gives the commands, a line each."""
+    """Where it starts, which stops it comes to and what gives the commands, a line each."""
     known = asked.conduct
     if known is None:
         return []
@@ -36,27 +41,38 @@ def conduct_lines(asked: NextRecording) -> list[str]:
     lines = [f"it starts with {starts}"]
     if known.contacts:
         met = " and ".join(
-            f"{public_name(each.output)} {shown(each.at, each.output)} at up to "
-            f"{shown(each.speed, _speed(each.output), 2)}"
+            f"{public_name(each.output)} to or within {shown(each.within, each.output, 2)} of "
+            f"{shown(each.at, each.output)} at up to {shown(each.speed, _speed(each.output), 2)}"
             for each in known.contacts
         )
-        lines.append(f"it runs into the stops: {met}, as predicted")
+        lines.append(f"it comes to stops: {met}, as predicted")
     if known.loop:
-        lines.append(
-            "its loop gives the command that moves the plant at dr/dt + w (r - y), "
-            f"w = {number(known.loop.bandwidth_rad_s, 2)} rad/s, and the resting command where a "
-            f"resting reference is reached; {OPEN_LOOP}"
-        )
+        lines.append(_loop(known.loop))
     return lines
+
+
+def _loop(loop: Loop) -> str:
+    """The position loop that it was rehearsed with."""
+    limited = " and ".join(
+        f"{public_name(output)} limited to ±{shown(fastest, _speed(output), 3)}, at rest within "
+        f"{shown(loop.rest_within[output], output, 2)} of a resting reference"
+        for output, fastest in loop.fastest.items()
+    )
+    return (
+        "its loop gives the command that moves the plant at dr/dt + w (r - y), "
+        f"w = {number(loop.bandwidth_rad_s, 2)} rad/s, renewed every "
+        f"{number(1e3 * loop.update_s, 3)} ms, {limited}, where it gives the resting command; "
+        f"{OPEN_LOOP}"
+    )
 
 
 def _start(name: str, each: Start) -> str:
     """Where one output has to be, and where recordings had it if that is elsewhere."""
     at = shown(each.at, name)
-    own = list(dict.fromkeys(shown(value, name) for value in each.recorded))
+    own = list(dict.fromkeys(shown(value, name) for value in each.recorded if isfinite(value)))
     more = ", ..." if len(own) > TOLD_STARTS else ""
     elsewhere = f" (recordings start at {', '.join(own[:TOLD_STARTS])}{more})"
-    return f"{public_name(name)} at {at}{elsewhere if own != [at] else ''}"
+    return f"{public_name(name)} at {at}{elsewhere if own not in ([], [at]) else ''}"
 
 
 def _speed(output: str) -> str:
@@ -90,8 +106,8 @@ def conduct_document(known: Conduct) -> dict[str, Any]:
     return {
         "starts": {
             public_name(name): {
-                "at": each.at,
-                "recordings": [x if isfinite(x) else None for x in each.recorded],
+                "at": plain(each.at),
+                "recordings": [plain(value) for value in each.recorded],
                 "unit": si_unit(name),
             }
             for name, each in known.starts.items()
@@ -99,24 +115,38 @@ def conduct_document(known: Conduct) -> dict[str, Any]:
         "contacts": [
             {
                 "output": public_name(each.output),
-                "at": each.at,
+                "at": plain(each.at),
+                "within": plain(each.within),
                 "unit": si_unit(each.output),
-                "speed": each.speed,
+                "speed": plain(each.speed),
                 "speed_unit": si_unit(_speed(each.output)),
             }
             for each in known.contacts
         ],
-        "loop": {
-            "law": "speed dr/dt + w (r - y), given by the speed map; at a resting reference rest",
-            "bandwidth_rad_s": loop.bandwidth_rad_s,
-            "speed_maps": {
-                public_name(output): {
-                    "command": speeds.command.tolist(),
-                    "speed": speeds.speed.tolist(),
-                }
-                for output, speeds in loop.maps.items()
-            },
-        }
-        if loop
-        else None,
+        "loop": _loop_document(loop) if loop else None,
+    }
+
+
+def _loop_document(loop: Loop) -> dict[str, Any]:
+    """The position loop, its axes by public name."""
+    return {
+        "law": LAW,
+        "bandwidth_rad_s": plain(loop.bandwidth_rad_s),
+        "update_s": plain(loop.update_s),
+        "axes": {
+            public_name(output): {
+                "fastest": plain(fastest),
+                "speed_unit": si_unit(_speed(output)),
+                "rest_within": plain(loop.rest_within[output]),
+                "unit": si_unit(output),
+            }
+            for output, fastest in loop.fastest.items()
+        },
+        "speed_maps": {
+            public_name(output): {
+                "command": [plain(value) for value in speeds.command],
+                "speed": [plain(value) for value in speeds.speed],
+            }
+            for output, speeds in loop.maps.items()
+        },
     }

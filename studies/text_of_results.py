@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 CORRELATED = 0.9
 SHOWN_STRAINED = 4
+BEFORE_AFTER = ("before", "after")
+ADDED, FITTED = ("without it", "with it"), ("as it came", "fitted")  # the same of a rig's steps
 
 Errors = Mapping[str, Mapping[str, "SignalError"]]
 
@@ -109,9 +111,14 @@ def _memory_text(followed: Dependence, loop: Loop) -> str:
     )
 
 
-def before_after_text(before: Errors, after: Errors, unit_of: Mapping[str, str]) -> str:
+def before_after_text(
+    before: Errors,
+    after: Errors,
+    unit_of: Mapping[str, str],
+    words: tuple[str, str] = BEFORE_AFTER,
+) -> str:
     """RMSE and fit of each output before and after, on each set, and what they leave out."""
-    return errors_over({"before": before, "after": after}, unit_of)
+    return errors_over(dict(zip(words, (before, after), strict=True)), unit_of)
 
 
 def errors_over(states: Mapping[str, Errors], unit_of: Mapping[str, str]) -> str:
@@ -195,7 +202,7 @@ def addition_text(found: Addition, unit_of: Mapping[str, str]) -> str:
     if isfinite(found.drop_validation):
         drops += f", {removed(found.drop_validation)} of {found.evidence.value}"
     parameters = moved_text(found.parameters)
-    errors = errors_over({"without it": found.before, "with it": found.after}, unit_of)
+    errors = before_after_text(found.before, found.after, unit_of, ADDED)
     windows = windows_text(found.fit, found.validation_fit)
     return "\n".join((errors, windows, drops, "", parameters))
 
@@ -235,7 +242,7 @@ def fit_text(found: FitReport, unit_of: Mapping[str, str]) -> str:
     ]
     parts = [columns(("parameter", "prior", "fitted", ""), rows), ""]
     parts += correlation_lines([row.name for row in found.rows], found.correlations)
-    parts += ["", errors_over({"as it came": found.before, "fitted": found.after}, unit_of)]
+    parts += ["", before_after_text(found.before, found.after, unit_of, FITTED)]
     parts += [windows_text(found.fit, found.validation_fit)]
     return "\n".join(parts + ([] if found.converged else ["warning: the fit did not converge"]))
 

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from studies.checking import drawn_plant
-from studies.documents import Document, plain
+from studies.documents import Document
+from studies.plain import plain
 from studies.specification import Asked, Specification
 from studies.text import columns, shown
 from workbench.closed_loop import LoopRecord

@@ -88,6 +88,28 @@ def test_pressures_that_are_ten_times_too_large_are_told_so(tmp_path, factor, sa
     assert said in refused(tmp_path, text(rows))
 
 
+@pytest.mark.parametrize(
+    ("unit", "low", "high", "said"),
+    [
+        ("bar", 10.0, 55.0, "look ten times too large or psi"),
+        ("bar_gauge", 0.0, 55.0, "look ten times too large or psi"),
+        ("bar_gauge", 2.0, 55.0, "look ten times too large or psi"),
+        ("bar", 0.12, 0.2, "look like MPa"),
+        ("psi", 3.0, 7.0, "look ten times too small or bar"),
+        ("bar_gauge", 0.001, 0.008, "look ten times too small;"),
+        ("bar_gauge", 0.0001, 0.0009, "cannot be"),
+    ],
+)
+def test_ten_times_is_of_what_the_sensor_sees_which_ambient_is_no_part_of(
+    tmp_path, unit, low, high, said
+):
+    rows = table()
+    rows[:, 2] = np.linspace(low, high, N)
+    rig = RIG.replace('unit = "bar"', f'unit = "{unit}"')
+
+    assert said in refused(tmp_path, text(rows), rig=rig)
+
+
 def test_gauge_pressures_read_as_absolute_are_refused(tmp_path):
     rows = table()
     rows[:, 2] -= 5.0

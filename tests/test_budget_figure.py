@@ -5,9 +5,10 @@ from itertools import pairwise
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from studies.figures.improvement import budget_figure
+from studies.figures.improvement import budget_figure, errors_figure
 from studies.figures.style import styled
 from workbench.diagnosis.improvement import Stage
+from workbench.fitting.errors import SignalError
 
 
 def test_the_last_steps_of_a_budget_can_be_seen_beside_the_first():
@@ -18,6 +19,24 @@ def test_the_last_steps_of_a_budget_can_be_seen_beside_the_first():
 
     assert axes.get_ylim()[0] == 1.0 and axes.get_ylim()[1] > 1.7e4
     assert high - low > 0.1
+
+
+def test_a_budget_below_the_noise_stays_on_its_axis():
+    (axes,) = budget_figure([Stage("as it came", 0.9, 0.8), Stage("+ leak", 0.2, 0.3)]).axes
+
+    assert 0.0 < axes.get_ylim()[0] < 0.2
+
+
+def test_each_state_of_a_rig_is_drawn_with_its_own_errors():
+    rmse_m = {"as it came": 3e-3, "refitted": 2e-3, "in the end": 1e-3}
+    states = {
+        words: {"train": {"slide.position": SignalError(size_m, 50.0, 1e-5)}}
+        for words, size_m in rmse_m.items()
+    }
+    (axes,) = errors_figure(states, {"slide.position": "slide.position_m"}).axes
+    drawn = {bars.get_label(): [bar.get_height() for bar in bars] for bars in axes.containers}
+
+    assert drawn == {words: [pytest.approx(1e3 * size_m)] for words, size_m in rmse_m.items()}
 
 
 @pytest.mark.parametrize(

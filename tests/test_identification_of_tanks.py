@@ -5,6 +5,7 @@ limits of the dead zone within 20 mV.
 """
 
 from dataclasses import replace
+from math import isfinite
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from workbench.comparison import compare
 from workbench.errors import InputError
 from workbench.identification import PROCEDURES
 from workbench.identification.dead_zone import dead_zone
+from workbench.identification.standing import end_reached
 from workbench.identification.tank_curves import tank_curves
 from workbench.rig import default_rig, load_rig
 from workbench.rig_writing import rig_text
@@ -137,6 +139,22 @@ def test_flow_parameters_of_each_path_come_out(flow):
         assert curve.critical_ratio.value == pytest.approx(critical, abs=0.05)
         assert curve.cracking_ratio.value == pytest.approx(0.995, abs=0.005)
         assert curve.subsonic_index.value == pytest.approx(0.52, abs=0.03)
+
+
+def test_the_curve_of_the_closed_valve_alone_ends_at_bounds_and_says_which(flow):
+    known = flow.rig.plant.parameters
+    for curve in flow.curves:
+        side = "supply" if curve.charging else "exhaust"
+        names = (f"{side}_critical_ratio", "cracking_ratio", "subsonic_index")
+        values = {name: getattr(curve, name.removeprefix(f"{side}_")) for name in names}
+        ends = [
+            each.name
+            for name, each in values.items()
+            if isfinite(end_reached(known[f"valve.{name}"], each.value))
+        ]
+
+        assert list(curve.at_bound) == ends, curve.label
+        assert bool(ends) is (round(curve.command_v, 2) == 5.0), curve.label
 
 
 @pytest.mark.slow

@@ -12,6 +12,7 @@ from studies import identification as study
 from studies.identification_text import doubts, identification_document, identified_text
 from studies.truth import dedicated as truth
 from workbench.effect import Parameter
+from workbench.errors import likest_first
 from workbench.identification import PROCEDURES
 from workbench.identification.result import Curve, Estimate, Identified
 from workbench.identification.standing import end_reached
@@ -99,6 +100,12 @@ def test_the_volume_of_another_tank_is_doubted(release, tmp_path):
     assert answer.exit_code == 0
     assert "prior deviations from the rig's 20 cm^3" in answer.stdout
     assert json.loads((tmp_path / "x.json").read_text())["warnings"]
+
+
+def test_names_that_look_most_like_one_come_first():
+    names = ("command_V", "pressure_a_bar", "supply_pressure_bar")
+
+    assert likest_first("supply.pressure", names) == [*names[::-1]]
 
 
 def test_a_column_that_the_rig_does_not_map_is_named(release):

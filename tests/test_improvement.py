@@ -180,15 +180,24 @@ def test_an_improvement_is_told_as_text_and_as_a_document(improved):
 def test_shares_and_parameters_are_told_alike_as_text_and_as_a_document(improved):
     first, *others = improved.removals
     moved = Moved("rod.mass_kg", 2.0, 2.5, 0.01, 0.2)
+    most = {
+        key: 1.01 + 0.01 * k
+        for k, key in enumerate(
+            ("share_train", "share_validation", "rival_train", "rival_validation")
+        )
+    }
     odd = replace(
         improved,
         removals=(replace(first, share_validation=1.039), *others),
+        swaps=(replace(improved.swaps[0], **most),),
         parameters=(moved, replace(moved, after=2.1, deviation=float("nan"))),
     )
     table = improvement_text(odd, UNITS).splitlines()[-2:]
     told = improvement_document(odd, UNITS)
 
     assert told["removals"][0]["share_validation"] == 1.0
+    shares = {value for key, value in told["swaps"][0].items() if "share" in key}
+    assert shares == {1.0}
     assert table[0].endswith("2.5 prior deviations away") and table[1].endswith("at its bound")
     assert [row["at_bound"] for row in told["parameters"]] == [False, True]
     assert told["parameters"][0]["prior_deviations_moved"] == pytest.approx(2.5)
@@ -212,6 +221,9 @@ def test_the_budget_begins_with_the_rig_as_it_came_then_refitted(improved):
     for part in ("train", "validation"):
         rmse = [each[part]["rod.force"].rmse for each in (improved.came, improved.before)]
         assert told["as_it_came"][part]["rod.force"]["rmse"] == rmse[0] != rmse[1]
+    ran = replace(improved, free_before=improved.came, free_after=improved.after)
+    free = improvement_document(ran, UNITS)["free_run"]
+    assert free == {"as_it_came": told["as_it_came"], "after": told["after"]}
     heads = [line.split() for line in improvement_text(improved, UNITS).splitlines()]
     rmse = "RMSE as it came refitted in the end"
     assert any(rmse in " ".join(line) for line in heads)

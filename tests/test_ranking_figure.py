@@ -2,10 +2,11 @@
 
 import csv
 
+from matplotlib.colors import to_hex
 from test_report import diagnosis
 
-from studies.figures.diagnosis import diagnosis_figures
-from studies.figures.style import save
+from studies.figures.diagnosis import HOLLOW, diagnosis_figures
+from studies.figures.style import BLUE, save
 from workbench.diagnosis.result import Verdict
 
 
@@ -19,6 +20,18 @@ def test_the_key_of_a_tied_ranking_fits_its_page():
     assert "=: cannot be told apart here" in figure.get_suptitle()
     assert drawn.x0 >= 0.0 and drawn.y0 >= 0.0
     assert drawn.x1 <= width and drawn.y1 <= height
+
+
+def test_bars_of_a_scan_are_hollow_and_those_of_a_refit_are_not():
+    (axes,) = diagnosis_figures(diagnosis())["ranking"].axes
+    looks = {
+        bars.get_label(): (to_hex(bar.get_facecolor()), bar.get_hatch())
+        for bars in axes.containers
+        for bar in bars
+    }
+
+    assert looks["training, only scanned"] == (to_hex("white"), HOLLOW["hatch"])
+    assert looks["training"] == (to_hex(BLUE), None)
 
 
 def test_a_scanned_effect_does_not_look_like_a_refit_in_the_ranking(tmp_path):

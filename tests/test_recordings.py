@@ -140,6 +140,14 @@ def test_missing_samples_of_an_output_stay_missing(tmp_path):
     assert np.flatnonzero(np.isnan(recording["slide.position_m"])).tolist() == list(range(50, 70))
 
 
+def test_columns_that_the_rig_does_not_read_are_known_by_name(tmp_path):
+    lines = text(table()).splitlines()
+    more = [",".join((line, str(k))) for k, line in enumerate(lines[1:])]
+
+    assert read(tmp_path, text(table())).unmapped == ()
+    assert read(tmp_path, "\n".join([f"{lines[0]},supply_bar", *more])).unmapped == ("supply_bar",)
+
+
 def test_a_row_that_was_not_finished_is_left_out(tmp_path):
     with pytest.warns(RecordingWarning, match=r"run\.csv:401: unfinished row left out"):
         recording = read(tmp_path, text(table())[:-20])

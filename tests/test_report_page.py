@@ -1,12 +1,21 @@
 """The report: one page that needs no network, made again from its folder alone."""
 
 import re
+from math import nan
 
+import numpy as np
 import pytest
 
 from studies.figures.style import new_figure, save, styled
+from studies.page.reporting import Found, report
+from studies.page.tasks import Accepted
 from studies.report import Section, render_folder, write_report
+from studies.text_of_results import ADDED, FITTED
+from workbench.diagnosis.addition import Addition
 from workbench.errors import InputError
+from workbench.fitting.errors import SignalError
+from workbench.fitting.fit import FitReport
+from workbench.rig import default_rig
 
 
 @pytest.fixture(scope="module")
@@ -84,3 +93,25 @@ def test_a_report_of_others_is_refused(tmp_path):
 
     with pytest.raises(InputError, match="no report of ours"):
         render_folder(tmp_path)
+
+
+def test_steps_of_the_page_are_told_in_the_words_of_their_commands(tmp_path):
+    """Of the page itself, which keeps no fits, and of its replay script, which has them."""
+    rig = default_rig("servo_drive")
+    before, after = (
+        {"train": {"slide.position": SignalError(rmse, nan, 1e-5)}} for rmse in (2e-3, 1e-3)
+    )
+    kept = Accepted("valve_lag", rig, before, after, (), "")
+    refitted = Accepted("fit", rig, before, after, (), "", FITTED)
+    added = Addition(rig, None, before, after, 0.5, 0.5, (), None, None)
+    fitted = FitReport(rig, (), np.eye(0), before, after, True, None)
+
+    written = report(
+        tmp_path, "", "rig", Found(steps=(kept, refitted, added, fitted)), lambda _: None
+    )
+
+    tables = re.findall(r"RMSE (without it|as it came)\s+(with it|fitted)\s", written.read_text())
+    assert tables == [ADDED, FITTED, ADDED, FITTED]
+    for number, words in enumerate(tables, start=1):
+        drawn = (tmp_path / "figures" / f"step_{number}.csv").read_text()
+        assert all(f",{each}," in drawn for each in words)

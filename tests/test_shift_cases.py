@@ -58,16 +58,19 @@ def test_the_table_of_the_cases_ends_with_their_mean():
 
 
 def test_the_document_holds_the_cases_of_all_recordings():
-    parts = [shift("N to H", 0.04, NONE)], [shift("N to H", 0.06, NONE)]
+    first = shift("N to H", 0.04, NONE), shift("L to N", 0.11, NONE)
+    parts = first, [shift("N to H", 0.06, NONE)]
     recordings = tuple(SimpleNamespace(shifts=each) for each in parts)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("studies.documents._compared", lambda each: {})
         document = comparison_document(Comparison("gearbox", recordings))
 
-    (case,) = document["shift_cases"]
+    case, _ = document["shift_cases"]
     assert (case["case"], case["shifts"]) == ("N to H", 2)
     assert case["deviation"]["chamber_1.pressure"] == pytest.approx(0.05)
     assert case["deviation"]["main_piston.position"] is None
+    mean = document["shift_cases_mean"]  # 8 % of the cases, not 7 % of the shifts
+    assert mean == {"chamber_1.pressure": pytest.approx(0.08), "main_piston.position": None}
 
 
 def test_the_table_stands_beside_the_figures_as_csv_and_latex(tmp_path):

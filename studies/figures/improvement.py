@@ -98,9 +98,10 @@ def before_after_figure(
     before: Mapping[str, Mapping[str, SignalError]],
     after: Mapping[str, Mapping[str, SignalError]],
     unit_of: Mapping[str, str],
+    words: tuple[str, str] = ("before", "after"),
 ) -> Figure:
-    """RMSE over windows of each output before and after, on each set."""
-    return errors_figure({"before": before, "after": after}, unit_of)
+    """RMSE over windows of each output before and after, in these words, on each set."""
+    return errors_figure(dict(zip(words, (before, after), strict=True)), unit_of)
 
 
 def errors_figure(

@@ -19,7 +19,8 @@ from studies.page.control_tasks import modes_of
 from studies.report.page import FIGURES, Section, write_report
 from studies.text_of_comparison import comparison_text
 from studies.text_of_ranking import ranking_text
-from studies.text_of_results import before_after_text, moved_text, unit_names
+from studies.text_of_results import ADDED, FITTED, before_after_text, moved_text, unit_names
+from workbench.fitting.fit import FitReport
 
 if TYPE_CHECKING:
     from linearize.modes import HybridModel
@@ -71,9 +72,10 @@ def report(
     for number, step in enumerate(found.steps, start=1):
         units = unit_names(step.rig.plant.measured)
         parameters = getattr(step, "parameters", ())
-        table = before_after_text(step.before, step.after, units)
+        words = _words(step)
+        table = before_after_text(step.before, step.after, units, words)
         table += f"\n\n{moved_text(parameters)}" if parameters else ""
-        drawn = {f"step_{number}": before_after_figure(step.before, step.after, units)}
+        drawn = {f"step_{number}": before_after_figure(step.before, step.after, units, words)}
         note = step.rig.notes[-1] if step.rig.notes else ""
         tell(f"Step {number}", note, table, drawn)
     if found.hybrid:
@@ -87,6 +89,12 @@ def report(
     if not sections:
         sections.append(Section("Nothing was done yet"))
     return write_report(folder, f"What was found of {name}", command, sections)
+
+
+def _words(step: Accepted) -> tuple[str, str]:
+    """What the errors of a step are before and after, as its command says; the page's has them."""
+    own = FITTED if isinstance(step, FitReport) else ADDED
+    return getattr(step, "words", own)
 
 
 def report_with_modes(

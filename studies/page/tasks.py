@@ -14,7 +14,14 @@ from pathlib import Path
 import workbench
 from studies.page.drivers import Driver, Regimes, drivers_of, regime_errors
 from studies.page.plausibility import Finding, findings_of, gate_of
-from studies.text_of_results import addition_text, diagnosis_text, fit_text, unit_names
+from studies.text_of_results import (
+    ADDED,
+    FITTED,
+    addition_text,
+    diagnosis_text,
+    fit_text,
+    unit_names,
+)
 from workbench.comparison.compare import Comparison
 from workbench.comparison.independence import Independence, independence_of
 from workbench.diagnosis.result import NextRecording, Ranked, Verdict, Where
@@ -68,7 +75,10 @@ class Diagnosed:
 
 @dataclass(frozen=True, eq=False)
 class Accepted:
-    """A rig after one effect was added, or a fit, without its fits; see ``Addition``."""
+    """A rig after one effect was added, or a fit, without its fits; see ``Addition``.
+
+    ``words`` say what its errors are before and after.
+    """
 
     name: str
     rig: Rig
@@ -76,6 +86,7 @@ class Accepted:
     after: Errors = field(repr=False)
     parameters: tuple[Moved, ...] = field(repr=False)
     text: str = field(repr=False)
+    words: tuple[str, str] = ADDED
 
 
 def open_recordings(rig: Rig, paths: Sequence[str], say: Say) -> tuple[Opened, ...]:
@@ -155,4 +166,4 @@ def fit(
         for row in found.rows
     )
     text = fit_text(found, unit_names(rig.plant.measured))
-    return Accepted("fit", found.rig, found.before, found.after, moved, text)
+    return Accepted("fit", found.rig, found.before, found.after, moved, text, FITTED)

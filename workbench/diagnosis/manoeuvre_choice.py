@@ -109,7 +109,7 @@ def asked_for(
         noise=dict(zip(windows.plant.measured, windows.noise.tolist(), strict=True)),
         conduct=conduct(
             limits,
-            windows.plant.measured,
+            windows.plant,
             best.recorded,
             windows.recordings,
             best.maps if looped else (),

@@ -1,7 +1,7 @@
 """How a manoeuvre is played, as a person at the rig has to know it.
 
 Where it starts, since a prediction begins at the plant's own initial state and not where recordings
-began; how hard it meets the stops; and the position loop that it was rehearsed with
+began; how fast it comes to the stops; and the position loop that it was rehearsed with
 (:mod:`workbench.manoeuvres.rehearse`).  Commands of a loop alone, played open loop, drift away from
 their reference: a position integrates them.
 """
@@ -14,11 +14,12 @@ from math import isfinite
 
 import numpy as np
 
-from workbench.manoeuvres.limits import SPEED_SAMPLES, Axis, Limits
-from workbench.manoeuvres.rehearse import SpeedMap, bandwidth_rad_s
+from workbench.manoeuvres.limits import SPEED_SAMPLES, Limits, stops_of
+from workbench.manoeuvres.rehearse import SpeedMap, bandwidth_rad_s, rest_within, update_s
+from workbench.plant import Plant
 from workbench.recording import Recording
 
-NEAR = 3e-3  # of the stroke: closer to a stop a body is taken to meet it
+NEAR = 3e-3  # of the stroke: closer to a stop a body comes to it, whether it touches it or not
 
 
 @dataclass(frozen=True)
@@ -31,10 +32,14 @@ class Start:
 
 @dataclass(frozen=True)
 class Contact:
-    """A stop of an axis that is met, at ``at``, and the fastest approach of any rival; in SI."""
+    """A stop that an output comes to, to within ``within``, and the fastest that any rival does.
+
+    ``at`` is the stop; all in SI.
+    """
 
     output: str
     at: float
+    within: float
     speed: float
 
 
@@ -42,11 +47,25 @@ class Contact:
 class Loop:
     """The position loop: v = dr/dt + w (r - y), and the command that gives this speed.
 
-    ``maps`` are the speed maps by output of the axis; w is in rad/s.
+    Attributes
+    ----------
+    bandwidth_rad_s
+        w.
+    update_s
+        From one command to the next.
+    maps
+        The speed maps, here and below by output of the axis.
+    fastest
+        What v is limited to either way, in m/s or rad/s.
+    rest_within
+        How near to a resting reference the resting command is given, in m or rad.
     """
 
     bandwidth_rad_s: float
+    update_s: float
     maps: Mapping[str, SpeedMap]
+    fastest: Mapping[str, float]
+    rest_within: Mapping[str, float]
 
 
 @dataclass(frozen=True)
@@ -58,7 +77,7 @@ class Conduct:
     starts
         By output: the axes, or all outputs where commands move no positions.
     contacts
-        Of the stops that any rival meets.
+        With the stops that any rival comes to.
     loop
         None where commands are played as they are.
     """
@@ -70,23 +89,33 @@ class Conduct:
 
 def conduct(
     limits: Limits,
-    outputs: Sequence[str],
+    plant: Plant,
     predicted: Sequence[Recording],
     recorded: Sequence[Recording],
     maps: Sequence[SpeedMap] = (),
 ) -> Conduct:
     """How what was predicted is played, after what was recorded.
 
-    ``outputs`` are the measured ones, by full name; ``predicted`` are the rivals' recordings, the
-    likeliest first; ``maps`` those of the axes where a loop acts, in their order.
+    ``predicted`` are the rivals' recordings, the likeliest first; ``maps`` those of the axes where
+    a loop acts, in their order.
     """
-    axes = [axis.output for axis in limits.axes]
     first = predicted[0]
-    names = axes or outputs
+    names = [axis.output for axis in limits.axes] or plant.measured
     return Conduct(
         starts={n: Start(float(first[n][0]), tuple(_first(r[n]) for r in recorded)) for n in names},
-        contacts=tuple(c for axis in limits.axes for c in _contacts(axis, predicted)),
-        loop=Loop(bandwidth_rad_s(limits), dict(zip(axes, maps, strict=True))) if maps else None,
+        contacts=tuple(c for n in plant.measured for c in _contacts(n, plant, predicted)),
+        loop=_loop(limits, maps) if maps else None,
+    )
+
+
+def _loop(limits: Limits, maps: Sequence[SpeedMap]) -> Loop:
+    """The loop as it was rehearsed."""
+    return Loop(
+        bandwidth_rad_s(limits),
+        update_s(limits),
+        maps={axis.output: speeds for axis, speeds in zip(limits.axes, maps, strict=True)},
+        fastest={axis.output: axis.speed for axis in limits.axes},
+        rest_within={axis.output: rest_within(axis) for axis in limits.axes},
     )
 
 
@@ -96,24 +125,25 @@ def _first(values: np.ndarray) -> float:
     return float(seen[0]) if len(seen) else float("nan")
 
 
-def _contacts(axis: Axis, predicted: Sequence[Recording]) -> list[Contact]:
-    """The stops of an axis that are met."""
-    stroke = axis.stops[1] - axis.stops[0]
-    if not isfinite(stroke):
+def _contacts(output: str, plant: Plant, predicted: Sequence[Recording]) -> list[Contact]:
+    """The stops that an output comes to."""
+    stops = stops_of(plant, output)
+    near = NEAR * (stops[1] - stops[0])
+    if not isfinite(near):
         return []
     found = []
-    for stop, side in zip(axis.stops, (1.0, -1.0), strict=True):
-        speeds = [s for each in predicted for s in _approaches(each, axis, stop, side)]
+    for stop, side in zip(stops, (1.0, -1.0), strict=True):
+        rooms = [side * (each[output] - stop) for each in predicted]
+        dt = predicted[0].sample_time_s
+        speeds = [speed for room in rooms for speed in _approaches(room, near, dt)]
         if speeds:
-            found.append(Contact(axis.output, stop, max(speeds)))
+            found.append(Contact(output, stop, near, float(np.fmax.reduce(speeds))))
     return found
 
 
-def _approaches(predicted: Recording, axis: Axis, stop: float, side: float) -> list[float]:
-    """Speeds at which a stop is met in one prediction; ``side`` is 1 for the lower one, else -1."""
-    room = side * (predicted[axis.output] - stop)
-    near = room < NEAR * (axis.stops[1] - axis.stops[0])
-    met = np.flatnonzero(near[1:] & ~near[:-1]) + 1
+def _approaches(room: np.ndarray, near: float, sample_time_s: float) -> list[float]:
+    """Speeds at which ``room``, what is left to a stop at each sample, falls below ``near``."""
+    close = room < near
+    met = np.flatnonzero(close[1:] & ~close[:-1]) + 1
     before = np.maximum(met - SPEED_SAMPLES, 0)
-    lasted_s = (met - before) * predicted.sample_time_s
-    return [float(v) for v in np.abs(room[met] - room[before]) / lasted_s]
+    return [float(v) for v in np.abs(room[met] - room[before]) / ((met - before) * sample_time_s)]

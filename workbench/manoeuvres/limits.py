@@ -138,13 +138,18 @@ def _range(name: str, recordings: Sequence[Recording]) -> tuple[float, float]:
 
 def _axis(plant: Plant, output: str, recordings: Sequence[Recording]) -> Axis:
     low, high = _range(output, recordings)
-    body = output.rpartition(".")[0]
-    ends = [e for e in plant.effects if isinstance(e, EndStops) and e.body == body]
-    stops = (float(ends[0].lower_m), float(ends[0].upper_m)) if ends else (-inf, inf)
     speed = max(_fastest(piece[output], r.sample_time_s) for r in recordings for piece in r.pieces)
     states = dict(zip(plant.state_list, plant.initial, strict=True))
     start = float(np.clip(states.get(output, (low + high) / 2), low, high))
-    return Axis(output, start, low, high, speed, stops)
+    return Axis(output, start, low, high, speed, stops_of(plant, output))
+
+
+def stops_of(plant: Plant, output: str) -> tuple[float, float]:
+    """Ends of the stroke of a measured position, infinite where its body has no stops; in SI."""
+    body, _, quantity = output.rpartition(".")
+    ends = [e for e in plant.effects if isinstance(e, EndStops) and e.body == body]
+    there = ends and quantity in POSITIONS
+    return (float(ends[0].lower_m), float(ends[0].upper_m)) if there else (-inf, inf)
 
 
 def _fastest(values: np.ndarray, sample_time_s: float) -> float:

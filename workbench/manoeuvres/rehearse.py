@@ -105,23 +105,33 @@ def _speeds(moved: np.ndarray, axis: Axis, sample_time_s: float) -> np.ndarray:
     return (moved[rows, last] - moved[rows, half]) / ((last - half) * sample_time_s)
 
 
+def update_s(limits: Limits) -> float:
+    """Time from one command of the loop to the next, which it holds meanwhile."""
+    return BLOCK * limits.sample_time_s
+
+
 def bandwidth_rad_s(limits: Limits) -> float:
     """The loop's bandwidth w: less where its updates are far apart."""
-    return min(BANDWIDTH_RAD_S, PER_UPDATE / (BLOCK * limits.sample_time_s))
+    return min(BANDWIDTH_RAD_S, PER_UPDATE / update_s(limits))
+
+
+def rest_within(axis: Axis) -> float:
+    """How near to a resting reference the loop rests, in m or rad."""
+    return REST * (axis.high - axis.low)
 
 
 def _loop(
     limits: Limits, axis: Axis, speeds: SpeedMap, reference: np.ndarray, y: np.ndarray, first: int
 ) -> np.ndarray:
     """The command of one axis until the next update, for every play, shape (n_plays,)."""
-    step_s = BLOCK * limits.sample_time_s
+    step_s = update_s(limits)
     later = min(first + BLOCK, reference.shape[1] - 1)
     rate = (reference[:, later] - reference[:, first]) / step_s
     error = reference[:, first] - y
     wanted = rate + bandwidth_rad_s(limits) * error
     given = speeds.command_for(np.clip(wanted, -axis.speed, axis.speed))
-    range_ = axis.high - axis.low
-    rests = (np.abs(error) < REST * range_) & (np.abs(rate) < 1e-6 * range_ / step_s)
+    still = np.abs(rate) < 1e-6 * (axis.high - axis.low) / step_s
+    rests = (np.abs(error) < rest_within(axis)) & still
     nominal = limits.commands[limits.axes.index(axis)].nominal
     return np.where(rests, nominal, given)
 

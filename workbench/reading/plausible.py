@@ -58,7 +58,7 @@ def cannot_be(
         least, size = LEAST_GAUGE_PA, float(np.nanmax(np.abs(raw))) * scale(unit, name).factor
     if not least <= size <= most:
         seen = f"values between {np.nanmin(raw):.4g} and {np.nanmax(raw):.4g}"
-        others, tenfold = _looks_like(name, raw, unit), _ten_times(name, si, plant)
+        others, tenfold = _looks_like(name, raw, unit), _ten_times(name, si, unit, plant)
         if tenfold and not _is_ten_times(others, unit, name):
             look = " or ".join((f"ten times {tenfold}", *others))
             expected = f"another unit than '{unit}', or another gain of the sensor"
@@ -71,15 +71,17 @@ def cannot_be(
     return None
 
 
-def _ten_times(name: str, si: np.ndarray, plant: Plant) -> str:
+def _ten_times(name: str, si: np.ndarray, unit: str, plant: Plant) -> str:
     """Whether a pressure is ``too large`` or ``too small`` by ten for this supply and ambient."""
     if si_unit(name) != "Pa" or not {SUPPLY, AMBIENT} <= plant.values.keys():
         return ""
+    base_pa = plant.values[AMBIENT] if unit.endswith("_gauge") else 0.0  # where a sensor reads 0
     lowest_pa = (1.0 - ROOM) * plant.values[AMBIENT]
     highest_pa = (1.0 + ROOM) * plant.values[SUPPLY]
     for factor, words in ((0.1, "too large"), (10.0, "too small")):
-        low_pa, high_pa = factor * np.nanmin(si), factor * np.nanmax(si)
-        if lowest_pa <= low_pa and high_pa <= highest_pa:
+        low_pa, high_pa = (factor * (end(si) - base_pa) for end in (np.nanmin, np.nanmax))
+        there = max(-low_pa, high_pa) >= LEAST_GAUGE_PA  # ambient alone is no pressure on a gauge
+        if there and lowest_pa <= base_pa + low_pa and base_pa + high_pa <= highest_pa:
             return words
     return ""
 
