@@ -15,6 +15,7 @@ from math import pi, radians, tau
 import numpy as np
 
 from linearize.axes import joint_axes, travel_axis
+from studies.scenarios import AFTER_S
 from workbench.leg import Leg
 from workbench.plant import Plant
 from workbench.plants.soft_joint import ATMOSPHERE_PA
@@ -39,6 +40,7 @@ class Task:
 
     It begins at rest where ``start`` says, at the beginning of the reference by default.  ``asked``
     says by figure of a run what it may be at most, where that does not depend on the run.
+    ``afterwards`` is how the references would go on after the run, shape (m,) each.
     """
 
     name: str
@@ -46,6 +48,7 @@ class Task:
     judged_s: float
     asked: Mapping[str, float] = field(default_factory=dict)
     start: Mapping[str, float] = field(default_factory=dict)
+    afterwards: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     @property
     def begin(self) -> dict[str, float]:
@@ -85,28 +88,28 @@ def rig_tasks(plant: Plant) -> Iterator[Task]:
     axis = travel_axis(plant)
     middle_m = sum(axis.ends) / 2.0
     for hz in (0.25, 0.5, 1.0):
-        time_s = TICK_S * np.arange(round(1.5 / hz / TICK_S))
+        n, time_s = _clock(1.5 / hz)
         wanted = middle_m + RIG_AMPLITUDE_M * np.sin(tau * hz * time_s)
         asked = {"largest_error_m": RIG_SHARE * RIG_AMPLITUDE_M}
-        yield Task(f"{hz:g}-hz", {axis.position: wanted}, 0.5 / hz, asked)
+        yield _moving(f"{hz:g}-hz", {axis.position: wanted}, n, 0.5 / hz, asked)
 
 
 def arm_tasks(plant: Plant) -> Iterator[Task]:
     """22 to 90 degrees, two periods from the lower end, judged in the second."""
     axis = travel_axis(plant)
     for name, rate_rad_s in (("2-rad-s", 2.0), ("1-hz", tau)):
-        time_s = TICK_S * np.arange(round(2.0 * tau / rate_rad_s / TICK_S))
+        n, time_s = _clock(2.0 * tau / rate_rad_s)
         swing = np.sin(rate_rad_s * time_s - pi / 2.0)
         wanted = ARM_MIDDLE_RAD + ARM_AMPLITUDE_RAD * swing
         asked = {"rmse_rad": ARM_RMSE_RAD}
-        yield Task(name, {axis.position: wanted}, tau / rate_rad_s, asked)
+        yield _moving(name, {axis.position: wanted}, n, tau / rate_rad_s, asked)
 
 
 def leg_tasks(plant: Plant) -> Iterator[Task]:
     """The foot from where it stands along an upright ellipse, two periods, judged in the second."""
     leg = leg_of(plant)
     start_m = [float(x) for x in leg.geometry.foot_m(leg_angles_rad(plant))]
-    time_s = TICK_S * np.arange(round(2.0 / ELLIPSE_HZ / TICK_S))
+    n, time_s = _clock(2.0 / ELLIPSE_HZ)
     turned = tau * ELLIPSE_HZ * time_s
     wide_m, high_m = ELLIPSE_M
     across = start_m[1] + wide_m / 2.0 * (np.cos(turned) - 1.0)
@@ -115,7 +118,7 @@ def leg_tasks(plant: Plant) -> Iterator[Task]:
     angles = np.array([leg.geometry.angles_rad(place) for place in foot]).T
     names = (f"{joint}.angle_rad" for joint in leg.joints)
     reference = dict(zip(names, angles, strict=True))
-    yield Task("ellipse", reference, 1.0 / ELLIPSE_HZ, {"rmse_m": FOOT_RMSE_M})
+    yield _moving("ellipse", reference, n, 1.0 / ELLIPSE_HZ, {"rmse_m": FOOT_RMSE_M})
 
 
 def vessel_tasks(plant: Plant) -> Iterator[Task]:
@@ -126,6 +129,26 @@ def vessel_tasks(plant: Plant) -> Iterator[Task]:
         pressures = np.full(n, ATMOSPHERE_PA + end * STEP_PA)
         asked, start = {"overshoot_pa": BAND * STEP_PA}, ATMOSPHERE_PA + begin * STEP_PA
         yield Task(f"{begin}-{end}", {BELLOWS: pressures}, 0.0, asked, {BELLOWS: start})
+
+
+def _clock(lasts_s: float) -> tuple[int, np.ndarray]:
+    """Samples of a run, and its time in s, shape (n + m,), which goes on after its end."""
+    n = round(lasts_s / TICK_S)
+    return n, TICK_S * np.arange(n + round(AFTER_S / TICK_S))
+
+
+def _moving(
+    name: str,
+    wanted: Mapping[str, np.ndarray],
+    n: int,
+    judged_s: float,
+    asked: Mapping[str, float],
+) -> Task:
+    """The first n samples of references that go on moving, shape (n + m,) each."""
+    run, after = (
+        {key: row[part] for key, row in wanted.items()} for part in (slice(n), slice(n, None))
+    )
+    return Task(name, run, judged_s, asked, afterwards=after)
 
 
 def leg_of(plant: Plant) -> Leg:

@@ -152,6 +152,7 @@ def followed(
         controller,
         estimator,
         task.reference,
+        afterwards=task.afterwards,
         initial=consistent_start(plant, task.begin),
         hardware=Hardware(noise=bench.noise(plant)),
         sample_time_s=bench.sample_time_s,
