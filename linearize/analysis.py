@@ -141,7 +141,7 @@ def prediction_error(
     plant, step = model.plant, model.plant.model.step(sample_time_s)
     command = mode.command + np.array([*command_change])
     sent = mode.sent(model, command)
-    held = {name: region.point for name, region in mode.box.items()}
+    held = {**mode.elsewhere, **{name: region.point for name, region in mode.box.items()}}
     point = held | dict(zip(mode.state_names, mode.state, strict=True))
     kept = [point.get(n, v) for n, v in zip(model.states, model.initial, strict=True)]
     x, small = model.full_under(kept, mode.sent(model, mode.command)), sampled(mode, sample_time_s)

@@ -77,7 +77,7 @@ def resting_states(hybrid: HybridModel, mode: Mode) -> tuple[str, ...]:
 def whole_point(hybrid: HybridModel, mode: Mode) -> np.ndarray:
     """The mode's point with all states and commands of the design model, shape (n_x + n_u,)."""
     model = hybrid.model
-    given = {name: region.point for name, region in mode.box.items()}
+    given = {**mode.elsewhere, **{name: region.point for name, region in mode.box.items()}}
     given |= dict(zip(mode.state_names, mode.state, strict=True))
     states = [given.get(n, v) for n, v in zip(model.states, model.initial, strict=True)]
     return np.array([*states, *mode.sent(model, mode.command)])

@@ -103,7 +103,7 @@ def joint_modes(plant: Plant, axes: tuple[Axis, ...]) -> HybridModel:
     """Of each joint {slide -, slide +} by place, the others held where the leg begins.
 
     A joint's mode has its own angle, speed, pressures and command only: the other cylinders do not
-    move it while they hold.
+    move it while they hold.  What it leaves out stands at its point beside it.
     """
     model = design_model(plant)
     model = replace(model, pushes={axis.velocity: axis.pressures[0] for axis in axes})
@@ -128,6 +128,8 @@ def _own(mode: Mode, axis: Axis) -> Mode:
     x = [mode.state_names.index(name) for name in states]
     u = [mode.command_names.index(axis.command)]
     box = {name: mode.box[name] for name in (axis.velocity, axis.position)}
+    names, point = (*mode.state_names, *mode.command_names), (*mode.state, *mode.command)
+    whole = dict(zip(names, map(float, point), strict=True))
     return replace(
         mode,
         name=" ".join(region.label for region in box.values()),
@@ -142,4 +144,5 @@ def _own(mode: Mode, axis: Axis) -> Mode:
         command=mode.command[u],
         drift=mode.drift[x],
         scale=mode.scale[x],
+        elsewhere={n: v for n, v in whole.items() if n not in (*states, axis.command)},
     )

@@ -14,7 +14,7 @@ Source: paper 003, Sec. V, with the errata E003-2 to E003-4: A = df/dx at (x0, u
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import product
 from typing import TYPE_CHECKING
 
@@ -53,8 +53,8 @@ class Mode:
         The point, shapes (n_x,), (n_u,), (n_y,) and (n_x,).
     scale
         Typical size of each state, shape (n_x,).
-    guards
-        What must hold besides the box.
+    guards, elsewhere
+        What must hold besides the box; values at the point of what is left out, where not initial.
     """
 
     name: str
@@ -72,6 +72,7 @@ class Mode:
     drift: np.ndarray
     scale: np.ndarray
     guards: tuple[Guard, ...] = ()
+    elsewhere: Mapping[str, float] = field(default_factory=dict)
 
     def holds(self, signals: Mapping[str, float]) -> bool:
         """True when every signal lies inside the box, and every guard holds."""
@@ -106,7 +107,7 @@ class Mode:
 
     def sent(self, model: DesignModel, command: np.ndarray) -> np.ndarray:
         """All commands of the model, (n_u,): the mode's own, and switches at their level."""
-        own = dict(zip(self.command_names, command, strict=True))
+        own = {**self.elsewhere, **dict(zip(self.command_names, command, strict=True))}
         return np.array([own[n] if n in own else self.box[n].point for n in model.commands])
 
     def rates(self, state: np.ndarray, command: np.ndarray) -> np.ndarray:

@@ -149,6 +149,7 @@ def run(
         controller,
         estimator,
         {POSITION: scenario.reference_m},
+        afterwards={POSITION: scenario.afterwards_m},
         initial=consistent_start(plant, {POSITION: scenario.reference_m[0]}),
         hardware=sensors(plant),
         sample_time_s=SAMPLE_TIME_S,

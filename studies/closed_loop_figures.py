@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 from linearize.standard import POSITION
 from studies.closed_loop_check import Check
 from studies.figures.style import PAGE_IN, new_figure
+from studies.scenarios import LATE_S
+from studies.text import number
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -16,6 +18,7 @@ if TYPE_CHECKING:
 
 LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1)), (0, (3, 1)), (0, (1, 1)))
 A_STEP = 20.0  # an error beyond so many times the range of interest is the step itself
+WIDER = 1.1  # than the error that is to be seen
 
 
 def draw_position(axes: Axes, records: dict[str, LoopRecord]) -> None:
@@ -29,15 +32,25 @@ def draw_position(axes: Axes, records: dict[str, LoopRecord]) -> None:
 
 
 def draw_error(axes: Axes, records: dict[str, LoopRecord], largest_m: float = 1e-3) -> None:
-    """Each run's error; near zero, up to ``largest_m``, where a step of the reference dwarfs it."""
-    most_m = 0.0
+    """Each run's error; where a step of the reference dwarfs it, near zero, with a note.
+
+    Near zero is up to ``largest_m``, or the largest error at the end of a run where that is more.
+    """
+    most_m = late_m = 0.0
     for style, (name, record) in zip(_styles(records), records.items(), strict=True):
         recording = record.recording
         error = recording[POSITION] - recording[f"reference.{POSITION}"]
         axes.plot(recording.time_s, 1e3 * error, **style, label=name)
         most_m = max(most_m, float(abs(error).max()))
-    if most_m > A_STEP * largest_m:
-        axes.set_ylim(-1e3 * largest_m, 1e3 * largest_m)
+        late = recording.time_s >= recording.time_s[-1] - LATE_S
+        late_m = max(late_m, float(abs(error[late]).max()))
+    range_m = max(largest_m, WIDER * late_m)
+    if most_m > max(A_STEP * largest_m, range_m):
+        axes.set_ylim(-1e3 * range_m, 1e3 * range_m)
+        told = (
+            f"axis cut at {number(1e3 * range_m, 2)} mm; errors up to {number(1e3 * most_m, 3)} mm"
+        )
+        axes.set_title(told, loc="right")
     axes.set_ylabel("error (mm)")
 
 

@@ -18,7 +18,7 @@ from workbench.plant import Plant
 
 SETTLED_M, GOAL_CYCLE_M = 0.2e-3, 0.1e-3
 LOST_SHARE = 0.1  # of the amplitude: a reference that is followed worse than this is lost
-DEAD_ZONE = "valve_dead_zone.half_width_v"
+DEAD_ZONE, OVERLAP = "valve_dead_zone.half_width_v", "valve.overlap_share"
 MARGIN_M, LOWEST_PA, BELOW_SUPPLY_PA = 2e-3, 1.2e5, 5e3
 
 
@@ -115,21 +115,28 @@ def measure(
 
 def _step_metrics(position: np.ndarray, wanted: np.ndarray, scenario: Scenario) -> dict[str, float]:
     """Those of a step; NaN where the reference does not end at rest."""
-    late = round(LATE_S / SAMPLE_TIME_S)
     if not scenario.ends_at_rest:
         return dict.fromkeys(
             ("rise_s", "overshoot_m", "settling_s", "final_error_m", "limit_cycle_m"), np.nan
         )
-    begins, size = round(scenario.begins_s / SAMPLE_TIME_S), wanted[-1] - wanted[0]
+    return step_figures(position, wanted, scenario.begins_s, SETTLED_M)
+
+
+def step_figures(
+    position: np.ndarray, wanted: np.ndarray, begins_s: float, within: float, unit: str = "m"
+) -> dict[str, float]:
+    """What a step of the reference is judged by, settled within a band; both rows are (n,)."""
+    late = round(LATE_S / SAMPLE_TIME_S)
+    begins, size = round(begins_s / SAMPLE_TIME_S), wanted[-1] - wanted[0]
     share, error = (position - wanted[0]) / size, position - wanted
-    outside = np.flatnonzero(np.abs(error) > SETTLED_M)
+    outside = np.flatnonzero(np.abs(error) > within)
     settled = outside[-1] + 1 if len(outside) else begins
     return {
         "rise_s": rise_s(share, SAMPLE_TIME_S),
-        "overshoot_m": float(max(share.max() - 1.0, 0.0) * abs(size)),
+        f"overshoot_{unit}": float(max(share.max() - 1.0, 0.0) * abs(size)),
         "settling_s": (settled - begins) * SAMPLE_TIME_S if settled < len(error) else inf,
-        "final_error_m": float(np.abs(error[-late:]).max()),
-        "limit_cycle_m": float(np.ptp(position[-late:])),
+        f"final_error_{unit}": float(np.abs(error[-late:]).max()),
+        f"limit_cycle_{unit}": float(np.ptp(position[-late:])),
     }
 
 
@@ -140,13 +147,14 @@ def rise_s(share: np.ndarray, sample_time_s: float) -> float:
     return float(np.argmax(share > 0.9) - np.argmax(share > 0.1)) * sample_time_s
 
 
-def valve_switches(plant: Plant, command_v: np.ndarray) -> float:
+def valve_switches(plant: Plant, command_v: np.ndarray, name: str | None = None) -> float:
     """How often a proportional valve goes over from one side to the other, its dead zone between.
 
-    A command within the dead zone opens neither side, and counts as none; ``command_v`` is (n,).
+    A command within the dead zone opens neither side, and counts as none; ``command_v``, that of
+    ``name`` or of the only valve, is (n,).
     """
-    opening_v = command_v - closed_command(plant)
-    half_v = plant.values.get(DEAD_ZONE, 0.0)
+    opening_v = command_v - closed_command(plant, name)
+    half_v = plant.values.get(DEAD_ZONE, plant.values.get(OVERLAP, 0.0))
     sides = np.sign(opening_v[np.abs(opening_v) > half_v])
     return float(np.count_nonzero(np.diff(sides)))
 

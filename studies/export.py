@@ -26,8 +26,8 @@ def export_modes(hybrid: HybridModel, folder: Path, command: str, text: str) -> 
     ``text`` is the table.  The MAT file holds a struct array with A, B, C, D, point and drift; the
     NumPy file the same arrays as ``A_0``, ``A_1`` and so on, and the names as ``name``,
     ``state_names_0``, ...  The map shows where each mode is active, the step the modes beside the
-    plant; neither of cuts that do not cover them.  Each mode has its own pole map where there are
-    at most 64.
+    plant; neither of cuts that do not cover them, or of modes of one joint each.  Each mode has its
+    own pole map where there are at most 64.
     """
     from linearize.hybrid_simulation import sampled_hybrid
     from studies.figures.modes import SINGLE_MAPS, mode_poles_figure, pole_figure
@@ -43,7 +43,7 @@ def export_modes(hybrid: HybridModel, folder: Path, command: str, text: str) -> 
     save(pole_figure(hybrid), folder / "poles", command)
     if len(hybrid.modes) <= SINGLE_MAPS:
         save(mode_poles_figure(hybrid), folder / "mode_poles", command)
-    if hybrid.plant.name not in VIEWS:
+    if hybrid.plant.name not in VIEWS or any(mode.elsewhere for mode in hybrid.modes):
         return
     try:
         modes = sampled_hybrid(hybrid, view_of(hybrid).sample_time_s)

@@ -14,8 +14,8 @@ from estimators.per_mode import chosen_per_mode
 from estimators.raw import RawMeasurement
 from estimators.scheduled_kalman import ScheduledKalman
 from studies.closed_loop_check import every_loop
-from studies.closed_loop_metrics import air_used_kg
-from studies.following import BAND, BENCHES, Task, leg_of
+from studies.closed_loop_metrics import air_used_kg, rise_s, step_figures, valve_switches
+from studies.following import BAND, BENCHES, WITHIN, Task, leg_of
 from studies.text import columns, number, shown
 from workbench.closed_loop import Hardware, LoopRecord, close_loop
 from workbench.contracts import Command, Controller, Estimate, Estimator
@@ -152,6 +152,7 @@ def followed(
         controller,
         estimator,
         task.reference,
+        afterwards=task.afterwards,
         initial=consistent_start(plant, task.begin),
         hardware=Hardware(noise=bench.noise(plant)),
         sample_time_s=bench.sample_time_s,
@@ -170,6 +171,8 @@ def measured(
     """The figures of one run, and what is asked of them."""
     figures, asked = _KINDS[plant.name](plant, record, task, controller.sample_time_s)
     figures["air_kg"] = air_used_kg(plant, record, BENCHES[plant.name].sample_time_s)
+    names = plant.model.commands
+    figures["switches"] = sum(valve_switches(plant, record.recording[n], n) for n in names)
     return Followed(
         design=design,
         estimator=estimator,
@@ -187,7 +190,15 @@ Figures = tuple[dict[str, float], dict[str, float]]
 
 def _place(plant: Plant, record: LoopRecord, task: Task, controller_s: float) -> Figures:
     ((name, wanted),) = task.reference.items()
+    if task.ends_at_rest:
+        return _place_step(record.recording[name], wanted, task, suffix(name)), {}
     return _errors(np.abs(record.recording[name] - wanted), task, suffix(name)), {}
+
+
+def _place_step(place: np.ndarray, wanted: np.ndarray, task: Task, unit: str) -> dict[str, float]:
+    found = step_figures(place, wanted, task.judged_s, WITHIN[unit], unit)
+    way = abs(float(wanted[-1] - wanted[0]))
+    return {**found, "overshoot_share": found[f"overshoot_{unit}"] / way}
 
 
 def _foot(plant: Plant, record: LoopRecord, task: Task, controller_s: float) -> Figures:
@@ -217,11 +228,14 @@ def _step(plant: Plant, record: LoopRecord, task: Task, controller_s: float) -> 
     over_pa = max(float((np.sign(way) * gone).max()), 0.0)
     open_s = _open_valve_s(plant, task, controller_s)
     longest_s = open_s + max(SLOWER * open_s, AT_LEAST * controller_s)
+    late = -round(LATE_S / tick_s)
     figures = {
+        "rise_s": rise_s(1.0 + gone / way, tick_s),
         "settling_s": settled_s,
         "overshoot_pa": over_pa,
         "overshoot_share": over_pa / abs(way),
-        "final_error_pa": float(np.abs(gone[-round(LATE_S / tick_s) :]).max()),
+        "final_error_pa": float(np.abs(gone[late:]).max()),
+        "limit_cycle_pa": float(np.ptp(gone[late:])),
     }
     return figures, {"settling_s": longest_s}
 

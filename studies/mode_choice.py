@@ -1,10 +1,11 @@
-"""Which modes a user wants of a rig: standard, by flow regimes, or placed where recordings go."""
+"""Which modes a user wants of a rig: standard, by regimes, a controller's, or placed."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from controllers import CONTROLLERS
 from linearize.listing import trial_of
 from linearize.modes import HybridModel
 from linearize.placement import SAMPLES, placed_modes
@@ -15,6 +16,7 @@ from linearize.stopped import has_stops
 from linearize.visits import joined, recorded_visits
 from studies.cuts_file import modes_by_cuts
 from workbench.errors import InputError, Message
+from workbench.plant import require
 from workbench.recording import Recording
 from workbench.rig import Rig
 from workbench.units import UnitError, quantity
@@ -30,24 +32,31 @@ def chosen_modes(
     number: int | None = None,
     regimes: bool = False,
     cuts: Path | None = None,
+    method: str = "",
 ) -> HybridModel:
     """The modes of a rig's plant: standard, by regimes, by the cuts of a file, or placed.
 
-    ``number`` of them are placed where the recordings go, as many as there are without it.
+    ``number`` of them are placed where the recordings go, as many as there are without it; with
+    ``method`` they are those on which this controller is designed.
 
     Raises
     ------
     InputError
         If there are no such modes, or a number without a recording to place them on.
+    UnknownNameError
+        If there is no such method, or none for the plant.
     ValueError
         If the recordings do not carry so many modes.
     """
-    asked = {"--place": placed_on, "--regimes": regimes, "--cuts": cuts}
+    asked = {"--place": placed_on, "--regimes": regimes, "--cuts": cuts, "--for": method}
     given = [name for name, value in asked.items() if value]
     if len(given) > 1:
         raise InputError(Message("each choose the regions", " and ".join(given), "one of them"))
     if number is not None and not placed_on:
         raise InputError(Message("needs a recording to place modes on", "--number", "--place REC"))
+    if method:
+        require((method,), CONTROLLERS, "the list of controllers")
+        return CONTROLLERS[method].modes(rig.plant)
     if cuts:
         return modes_by_cuts(rig.plant, cuts)
     if not placed_on:

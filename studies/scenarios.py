@@ -3,25 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 SAMPLE_TIME_S = 1e-3
 LATE_S = 0.4  # the end of a run, where a limit cycle is looked for
+AFTER_S = 1.0  # a moving reference goes on for so long, for controllers that look ahead
 
 
 @dataclass(frozen=True)
 class Scenario:
     """A reference of the position, shape (n,), on the plant's clock; it starts at rest there.
 
-    ``begins_s`` is when it begins to move, ``judged_s`` from when on tracking is judged.
+    ``begins_s`` is when it begins to move, ``judged_s`` from when on tracking is judged;
+    ``afterwards_m`` is how it would go on after the run, shape (m,).
     """
 
     name: str
     reference_m: np.ndarray
     begins_s: float
     judged_s: float
+    afterwards_m: np.ndarray = field(default_factory=lambda: np.empty(0))
 
     @property
     def ends_at_rest(self) -> bool:
@@ -38,8 +41,10 @@ def step_scenario(stroke_m: float) -> Scenario:
 
 def sine_scenario(stroke_m: float) -> Scenario:
     """A 0.5 Hz sine of 80 mm about the middle, two periods, judged after half a period."""
-    time_s = SAMPLE_TIME_S * np.arange(4000)
-    return Scenario("sine", stroke_m / 2 + 0.08 * np.sin(np.pi * time_s), 0.0, 1.0)
+    n = 4000
+    time_s = SAMPLE_TIME_S * np.arange(n + round(AFTER_S / SAMPLE_TIME_S))
+    wanted_m = stroke_m / 2 + 0.08 * np.sin(np.pi * time_s)
+    return Scenario("sine", wanted_m[:n], 0.0, 1.0, wanted_m[n:])
 
 
 SCENARIOS: dict[str, Callable[[float], Scenario]] = {

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
+from math import nan
 
 import numpy as np
 
@@ -25,12 +26,17 @@ from workbench.closed_loop import Hardware, LoopRecord, close_loop
 from workbench.contracts import Command, Controller, Estimate
 from workbench.filtering import consistent_start
 from workbench.plant import Plant
-from workbench.plants.gearbox import FINGER_M, FLOATING, MAIN
+from workbench.plants.gearbox import COMMANDS, FINGER_M, FLOATING, MAIN
 
 SAMPLE_TIME_S, LASTS_S, LATE_S = 2.5e-4, 0.08, 0.01
 SETTLED_M, OVERSHOT_M = 0.3e-3, 0.5e-3
 FEWER = 10  # plans judged at a sample, for a computer without time for all of them
 SLOWER, SOFTER, SOFT_M_S = 1.25, 0.5, 0.5
+BOUNDS = (
+    f"bounds: {SLOWER:g} times the time of the open loop; {SOFTER:g} times its impact, "
+    f"or {SOFT_M_S:g} m/s where that is more"
+)
+OPEN_LOOP = "open_loop."  # before the names of its channels in the record of a shift
 NOISE = {**dict.fromkeys(PRESSURES, 1e3), POSITION: 2e-5}
 PROCESS = {
     "chamber_1.pressure_pa": 2e5,
@@ -68,7 +74,8 @@ class Shift:
     final_error_m       largest error over the last 10 ms
     way_m               from start to target
     air_kg, switches    taken from the supply, and how often the valves switch
-    longest_s, hardest_m_s    what the open loop allows on this plant
+    longest_s, hardest_m_s    bounds of time and impact, which follow from those of the open loop
+    open_settling_s, open_impact_m_s    of the open loop on the same plant
     """
 
     design: str
@@ -85,6 +92,8 @@ class Shift:
     hardest_m_s: float
     solve_median_s: float
     solve_p99_s: float
+    open_settling_s: float = nan
+    open_impact_m_s: float = nan
 
     @property
     def overshoot_share(self) -> float:
@@ -112,8 +121,8 @@ class ShiftCheck:
 
     @property
     def text(self) -> str:
-        """All rows as a table."""
-        return shift_table(self.rows)
+        """All rows as a table, and what its bounds are."""
+        return f"{shift_table(self.rows)}\n{BOUNDS}"
 
 
 def check_shifts(
@@ -136,22 +145,33 @@ def check_shifts(
     for scenario in scenarios:
         target_m = SHIFTS[scenario][1] * half_stroke_m(plant)
         open_loop = Drive(leading[target_m])
-        bound = _measured(
-            truth, run(truth, open_loop, shift_filter(model, 1e-3), scenario, seed), scenario
-        )
+        beside = run(truth, open_loop, shift_filter(model, 1e-3), scenario, seed)
+        bound = _measured(truth, beside, scenario)
         for design, controller in designs.items():
             observer = shift_filter(model, controller.sample_time_s)
             record = run(truth, controller, observer, scenario, seed)
-            rows.append(
-                replace(
-                    _measured(truth, record, scenario),
-                    design=design,
-                    longest_s=SLOWER * bound.settling_s,
-                    hardest_m_s=max(SOFTER * bound.impact_m_s, SOFT_M_S),
-                )
-            )
-            records.append(record)
+            rows.append(_bounded(_measured(truth, record, scenario), design, bound))
+            records.append(_beside(record, beside))
     return ShiftCheck(tuple(rows), tuple(records))
+
+
+def _bounded(shift: Shift, design: str, bound: Shift) -> Shift:
+    """The shift of a design with what the open loop came to, and what that allows."""
+    return replace(
+        shift,
+        design=design,
+        longest_s=SLOWER * bound.settling_s,
+        hardest_m_s=max(SOFTER * bound.impact_m_s, SOFT_M_S),
+        open_settling_s=bound.settling_s,
+        open_impact_m_s=bound.impact_m_s,
+    )
+
+
+def _beside(record: LoopRecord, open_loop: LoopRecord) -> LoopRecord:
+    """The record with position and commands of the open loop in channels of its own."""
+    other = {OPEN_LOOP + name: open_loop.recording[name] for name in (POSITION, *COMMANDS)}
+    channels = {**record.recording.channels, **other}
+    return replace(record, recording=replace(record.recording, channels=channels))
 
 
 @cache
@@ -231,18 +251,20 @@ def impact_m_s(record: LoopRecord, end_m: float) -> float:
     return float(hardest)
 
 
-HEAD = ("design", "shift", "reached", "settle ms", "at most", "impact m/s", "at most",
+HEAD = ("design", "shift", "reached", "settle ms", "bound of time ms", "open loop ms",
+        "impact m/s", "bound of impact m/s", "open loop m/s",
         "over mm", "air g", "switches", "ctrl us", "p99 us")  # fmt: skip
 
 
 def shift_table(rows: Iterable[Shift]) -> str:
-    """The shifts as text, with the bounds beside what they bound."""
+    """The shifts as text, with bounds and open loop beside what they are for."""
     return columns(HEAD, [_row(row) for row in rows])
 
 
 def _row(row: Shift) -> tuple[str, ...]:
     numbers = (
-        1e3 * row.settling_s, 1e3 * row.longest_s, row.impact_m_s, row.hardest_m_s,
+        1e3 * row.settling_s, 1e3 * row.longest_s, 1e3 * row.open_settling_s,
+        row.impact_m_s, row.hardest_m_s, row.open_impact_m_s,
         1e3 * row.overshoot_m, 1e3 * row.air_kg, row.switches,
         1e6 * row.solve_median_s, 1e6 * row.solve_p99_s,
     )  # fmt: skip

@@ -19,7 +19,7 @@ from controllers import CONTROLLERS
 from controllers.spec import replaced
 from linearize.axes import stroke_m
 from linearize.standard import POSITION, PRESSURES, SHIFT_MODES, SLIDE_MODES, SUPPLY
-from studies.following import BENCHES
+from studies.following import BENCHES, FOLLOWING_LINES, STEP_LINES
 from studies.following_check import Followed, tasks_of
 from studies.scenarios import SCENARIOS
 from studies.shift_check import SHIFTS
@@ -58,6 +58,7 @@ SHIFT_LINES = {
 }
 """Likewise of :class:`studies.shift_check.Shift`."""
 
+ALL_LINES = {*SLIDE_LINES, *SHIFT_LINES, *FOLLOWING_LINES, *STEP_LINES}
 EVERYWHERE = ("air_kg", "switches")  # all else asks for an end at rest, or for none
 MOVING = ("rmse_m", "rmse_rad", "largest_error_m", "largest_error_rad")
 
@@ -140,7 +141,7 @@ def read_specification(
     require(chosen, judged, "the list of scenarios")
     content, path = read_text(path_or_text)
     text = RigText(content, str(path) if path else "spec", "a specification")
-    _top_keys(text, lines)
+    _top_keys(text, lines, rig.plant.name)
     asked = [*_figures(text, rig, lines, judged), *_limits(text, rig, tuple(judged))]
     for line in asked:
         if not set(chosen) & set(line.scenarios):
@@ -181,20 +182,25 @@ def _known(plant: Plant) -> tuple[Mapping[str, str], dict[str, bool]]:
         stroke = stroke_m(plant)
         return SLIDE_LINES, {name: make(stroke).ends_at_rest for name, make in SCENARIOS.items()}
     if plant.name in BENCHES:
-        bench = BENCHES[plant.name]
-        return bench.lines, dict.fromkeys(tasks_of(plant), bench.at_rest)
+        tasks = tasks_of(plant)
+        return BENCHES[plant.name].lines, {name: t.ends_at_rest for name, t in tasks.items()}
     expected = f"a rig of {listed((*SLIDE_MODES, *SHIFT_MODES, *BENCHES))}"
     raise InputError(Message(f"{plant.name} has no standard modes to control", expected=expected))
 
 
-def _top_keys(text: RigText, lines: Mapping[str, str]) -> None:
+def _top_keys(text: RigText, lines: Mapping[str, str], plant: str) -> None:
     known = (*lines, LIMITS, *CONTROLLERS)
     deeper = [
         f"{name}.{number}" for name, found in CONTROLLERS.items() for number in _names(found.spec())
     ]
     expected = f"one of {listed(known, len(known))}"
     for key in text.tree:
-        if key not in known:
+        if key in ALL_LINES and key not in known:
+            judging = (*lines, LIMITS)
+            text.wrong(
+                (key,), f"{plant} is not judged by it", expected=f"one of {listed(judging, 99)}"
+            )
+        elif key not in known:
             what = f"{text.kind} has no such name"
             text.wrong((key,), what, expected=expected, known=(*known, *deeper))
 

@@ -35,6 +35,18 @@ class Ramp:
 
 
 @dataclass(frozen=True)
+class Looking(Ramp):
+    """Likewise, and keeps the last reference that it looked ahead on."""
+
+    preview: int = 3
+    seen: list = field(default_factory=list)
+
+    def step(self, last, reference, estimate):
+        self.seen.append(reference[0])
+        return super().step(last, reference, estimate)
+
+
+@dataclass(frozen=True)
 class Through:
     """An estimator that hands on what it gets, and keeps it."""
 
@@ -109,6 +121,18 @@ def test_a_delayed_valve_moves_the_slide_later(plant):
 
     assert moved[1][:-5] != pytest.approx(moved[0][:-5], abs=1.0)
     assert moved[1][40:] == pytest.approx(moved[0][35:-5], rel=1e-3)
+
+
+def test_a_controller_that_looks_ahead_sees_the_reference_go_on_and_then_stand_still(plant):
+    wanted = 0.1 + 1e-3 * np.arange(11)
+    for after, end in (((), (4, 5, 5)), (wanted[6:9], (4, 6, 8)), (wanted[6:], (4, 6, 8))):
+        controller = Looking()
+        close_loop(
+            plant, controller, Through(), {POSITION: wanted[:6]}, afterwards={POSITION: after}
+        )
+
+        assert controller.seen[0] == pytest.approx(wanted[[0, 2, 4]])
+        assert controller.seen[-1] == pytest.approx(wanted[list(end)])
 
 
 def test_sample_times_that_do_not_fit_are_errors(plant):

@@ -96,6 +96,9 @@ def test_wrong_cuts_are_told_in_one_clear_message(tmp_path, regions, signal, sai
         (["--place", "none.csv"], "none.csv: there is no such file"),
         (["--regimes", "--place", studies.demo.DATA / "train.csv"], "each choose the regions"),
         (["--cuts", DRIVE], "has no [cuts]"),
+        (["--for", "axis-lqr"], "the list of controllers has no axis-lqr; did you mean axis-lq?"),
+        (["--for", "pressure"], "no modes to control a pressure with for servo_drive"),
+        (["--for", "lq", "--regimes"], "each choose the regions"),
     ],
 )
 def test_options_that_cannot_be_are_refused(words, said):

@@ -196,7 +196,7 @@ SAID = (
     ("switches", "expected a whole number from 0"),
     ("final_error", "expected a quantity from 0"),
     ("settling_time", "expected a finite quantity"),
-    ("impact_speed", "a specification has no such name; expected one of rise_time"),
+    ("impact_speed", "servo_drive is not judged by it; expected one of rise_time"),
     ("horizon", "did you mean 'mpc.horizon'?"),
     ("mpc.horizn", "did you mean 'horizon'?"),
     ("mpc.horizon", "a whole number from 1 to 500"),

@@ -16,7 +16,7 @@ FIVE = FIVE.split("```")[0]
 def place(tmp_path_factory):
     """Rigs, a design, the README's specification, and one that asks for less air."""
     folder = tmp_path_factory.mktemp("specification")
-    for plant in ("servo_drive", "crr_rig", "gearbox", "closed_chamber"):
+    for plant in ("servo_drive", "crr_leg", "gearbox", "closed_chamber"):
         (folder / f"{plant}.toml").write_text(f'plant = "{plant}"\n')
     (folder / "readme.toml").write_text(FIVE)
     (folder / "spec.toml").write_text(FIVE.replace('air         = "4 g"', 'air = "2 g"'))
@@ -114,7 +114,12 @@ def test_a_shift_that_takes_too_long_is_a_no_in_the_document_too():
         ("servo_drive", "", "asks for nothing"),
         ("servo_drive", 'rise = "1 s"', "spec.toml:1: rise: a specification has no such name"),
         ("closed_chamber", 'air = "1 g"', "closed_chamber has no standard modes to control"),
-        ("crr_rig", 'rise_time = "1 s"', "spec.toml:1: rise_time: a specification has no such"),
+        (
+            "crr_leg",
+            'rise_time = "1 s"',
+            "spec.toml:1: rise_time: crr_leg is not judged by it; expected one of tracking_error, "
+            "largest_error, air, switches, limits",
+        ),
     ],
 )
 def test_check_refuses_a_specification_before_it_runs_anything(

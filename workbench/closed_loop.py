@@ -95,6 +95,7 @@ def close_loop(
     estimator: Estimator,
     reference: Mapping[str, np.ndarray],
     *,
+    afterwards: Mapping[str, np.ndarray] | None = None,
     initial: np.ndarray | None = None,
     hardware: Hardware | None = None,
     sample_time_s: float = 1e-3,
@@ -106,6 +107,9 @@ def close_loop(
     ----------
     reference
         By name, one value per sample of the plant, shape (n,).
+    afterwards
+        How it would go on, for controllers with a preview, by name, any number of samples; after
+        the last one it stands still.
     initial
         State of the plant at the start, shape (n_x,), its own initial state by default.
     sample_time_s
@@ -120,9 +124,8 @@ def close_loop(
     """
     every = _ticks(controller, estimator, sample_time_s)
     hardware = hardware or Hardware()
-    wanted = np.array([*reference.values()])
-    n = wanted.shape[1]
-    ahead = np.pad(wanted, ((0, 0), (0, controller.preview * every)), mode="edge")
+    n = len(next(iter(reference.values())))
+    ahead = _ahead(reference, afterwards or {}, controller.preview * every)
     normal = np.random.default_rng(seed).standard_normal((n, len(plant.measured)))
     plant_step = _Plant(plant, sample_time_s, n)
     x = np.array(plant.initial if initial is None else initial, dtype=float)
@@ -144,6 +147,14 @@ def close_loop(
         rows.append((command.value, x, y, seen, estimate.state))
         x = plant_step(x, command.value, k)
     return _record(plant, reference, sample_time_s, rows, ticks, estimate.names)
+
+
+def _ahead(
+    reference: Mapping[str, np.ndarray], afterwards: Mapping[str, np.ndarray], samples: int
+) -> np.ndarray:
+    """The reference and at least so many samples after it, a row for each name."""
+    rows = [np.append(row, afterwards.get(name, ())) for name, row in reference.items()]
+    return np.pad(np.array(rows), ((0, 0), (0, samples)), mode="edge")
 
 
 def _ticks(controller: Controller, estimator: Estimator, sample_time_s: float) -> int:

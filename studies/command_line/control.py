@@ -36,6 +36,9 @@ def modes(
     cuts: Annotated[
         Path | None, typer.Option("--cuts", metavar="CUTS.toml", help="Intervals of your own.")
     ] = None,
+    method: Annotated[
+        str, typer.Option("--for", metavar="METHOD", help="Those that a design by it names.")
+    ] = "",
     horizon: Annotated[
         str | None, typer.Option("--horizon", metavar="TIME", help="To predict; '50 ms'.")
     ] = None,
@@ -64,7 +67,7 @@ def modes(
         known = load_rig(rig)
         recordings = read_all(known, place, say)
         say("linearising")
-        hybrid = chosen_modes(known, recordings, number, regimes, cuts)
+        hybrid = chosen_modes(known, recordings, number, regimes, cuts, method)
         regions = () if no_validity else regions_of(hybrid, *limits, say)
         text = modes_text(hybrid, regions)
         if json:

@@ -1,16 +1,20 @@
-"""Figures of gear shifts in closed loop: position, and the commands of both valves below."""
+"""Figures of gear shifts: closed loops beside the open one, and the commands of both valves."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from linearize.shifting import POSITION
-from studies.figures.style import COLUMN_IN, new_figure
-from studies.shift_check import SETTLED_M, ShiftCheck
+from studies.figures.style import COLUMN_IN, GREY, new_figure
+from studies.shift_check import OPEN_LOOP, SETTLED_M, ShiftCheck
 from workbench.plants.gearbox import COMMANDS
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from workbench.closed_loop import LoopRecord
 
 
 def shift_figures(found: ShiftCheck) -> dict[str, Figure]:
@@ -19,8 +23,11 @@ def shift_figures(found: ShiftCheck) -> dict[str, Figure]:
     for scenario in dict.fromkeys(row.scenario for row in found.rows):
         figure = new_figure(COLUMN_IN, 3.2)
         place, *valves = figure.subplots(3, sharex=True, height_ratios=(4, 1, 1))
-        pairs = zip(found.rows, found.records, strict=True)
-        for k, (row, record) in enumerate(p for p in pairs if p[0].scenario == scenario):
+        pairs = [
+            p for p in zip(found.rows, found.records, strict=True) if p[0].scenario == scenario
+        ]
+        _draw_open_loops(place, valves, [record for _, record in pairs])
+        for k, (row, record) in enumerate(pairs):
             recording = record.recording
             time_ms, line = 1e3 * recording.time_s, {"color": f"C{k % 8}", "label": row.design}
             place.plot(time_ms, 1e3 * recording[POSITION], **line)
@@ -36,3 +43,15 @@ def shift_figures(found: ShiftCheck) -> dict[str, Figure]:
         figure.legend(*place.get_legend_handles_labels(), loc="outside upper center", ncols=3)
         figures[f"shift_{scenario}"] = figure
     return figures
+
+
+def _draw_open_loops(place: Axes, valves: Iterable[Axes], records: list[LoopRecord]) -> None:
+    """What each plant does without a brake, once for all designs on it, thin and grey."""
+    line = {"color": GREY, "linestyle": "-", "linewidth": 0.5}
+    different = {each.recording[OPEN_LOOP + POSITION].tobytes(): each for each in records}
+    for k, record in enumerate(different.values()):
+        recording = record.recording
+        time_ms, label = 1e3 * recording.time_s, "open loop" if k == 0 else "_nolegend_"
+        place.plot(time_ms, 1e3 * recording[OPEN_LOOP + POSITION], label=label, **line)
+        for axes, command in zip(valves, COMMANDS, strict=True):
+            axes.step(time_ms, recording[OPEN_LOOP + command], where="post", label=label, **line)
