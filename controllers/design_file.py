@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from controllers import CONTROLLERS
-from controllers.spec import replaced
+from controllers.spec import farthest, replaced
 from linearize.modes import HybridModel
 from linearize.standard import (
     AXIS_MODES,
@@ -31,7 +31,7 @@ from linearize.standard import (
     vessel_modes,
 )
 from workbench.contracts import Controller
-from workbench.errors import Message, UnknownNameError, listed, nearest, whole_file
+from workbench.errors import InputError, Message, UnknownNameError, listed, nearest, whole_file
 from workbench.plant import Plant
 from workbench.plant_files import as_it_came, plant_named, plant_text
 from workbench.rig_laws import laws_of, with_laws
@@ -84,7 +84,20 @@ def design(method: str, plant: Plant, numbers: Mapping[str, Any] | None = None) 
         hybrid = found.modes(plant)
     except UnknownNameError as error:
         raise UnknownNameError(f"{error}; {_offered(plant)}") from error
-    return Design(method, plant, spec, hybrid, found.design(hybrid, spec))
+    try:
+        return Design(method, plant, spec, hybrid, found.design(hybrid, spec))
+    except np.linalg.LinAlgError as error:
+        raise _blamed(spec, method, error) from error
+
+
+def _blamed(spec: Any, method: str, error: Exception) -> Exception:
+    """The error by the number that is farthest from its usual value; itself where all are usual."""
+    name = farthest(spec)
+    if not name:
+        return error
+    value, usual = getattr(spec, name), getattr(type(spec)(), name)
+    what = f"is {value:g}, farthest of all numbers from usual, and the design fails: {error}"
+    return InputError(Message(what, f"{method}.{name}", f"a number nearer to the usual {usual:g}"))
 
 
 def methods_of(plant: Plant) -> list[str]:

@@ -122,7 +122,8 @@ def test_a_design_for_another_plant_is_refused(place, monkeypatch):
         ("horizon = 0", "spec.toml:2: mpc.horizon: is 0; expected a whole number from 1 to 500"),
         ("horizon = 2.5", "mpc.horizon: is 2.5; expected a whole number"),
         ("opening_v = nan", "mpc.opening_v: is nan; expected a number above 0"),
-        ("sample_time_s = -1", "mpc.sample_time_s: is -1; expected a number above 0"),
+        ("sample_time_s = -1", "mpc.sample_time_s: is -1; expected a number from 0.0001 to"),
+        ("sample_time_s = 50", "mpc.sample_time_s: is 50; expected a number from 0.0001 to 0.05"),
         ("[mpc.positioning]\nstribeck_share = 2", "expected a number from 0 to 1"),
         ("positon_m = 1", "did you mean 'position_m'?"),
         ("band_m = 1e-4", "did you mean 'positioning.band_m'?"),
@@ -141,6 +142,46 @@ def test_a_number_that_makes_no_sense_is_named_with_what_was_expected(place, tmp
     assert answer.exit_code == 2
     assert said in answer.stderr
     assert [p.name for p in tmp_path.iterdir()] == ["spec.toml"]
+
+
+@pytest.mark.parametrize(
+    ("method", "numbers", "said"),
+    [
+        (
+            "lq",
+            "sample_time_s = 0.0015",
+            "lq.sample_time_s: is 0.0015; expected a multiple of the 0.001 s at which servo_drive "
+            "is simulated, as 0.001 or 0.002",
+        ),
+        ("lq", "position_m = 1e-30", "lq.position_m: is 1e-30, farthest of all numbers from usual"),
+        ("lq", "position_m = 1e30\nsample_time_s = 0.05", "a number nearer to the usual 0.0015"),
+        ("mpc", "position_m = 1e30", "mpc.position_m: is 1e+30, farthest of all numbers"),
+    ],
+)
+def test_no_design_is_written_where_a_number_leads_nowhere(place, tmp_path, method, numbers, said):
+    spec = tmp_path / "spec.toml"
+    spec.write_text(f"[{method}]\n{numbers}\n")
+    answer = call(
+        "design", place / "servo_drive.toml", "--controller", method, "--spec", spec,
+        "-o", tmp_path / "design.toml", "-q",
+    )  # fmt: skip
+
+    assert answer.exit_code == 2
+    assert said in answer.stderr and len(answer.stderr.splitlines()) == 1
+    assert [p.name for p in tmp_path.iterdir()] == ["spec.toml"]
+
+
+def test_no_design_is_written_where_nothing_can_be_told_of_it(place, tmp_path, monkeypatch):
+    def failing(found, say):
+        raise ValueError("Invalid inputs.")
+        yield
+
+    monkeypatch.setattr("studies.design_text.design_texts", failing)
+    answer = call(
+        "design", place / "servo_drive.toml", "--controller", "lq", "-o", tmp_path / "lq.toml"
+    )
+
+    assert answer.exit_code == 2 and not [*tmp_path.iterdir()]
 
 
 def test_only_a_reference_that_ends_at_rest_has_a_goal_and_any_can_be_lost():

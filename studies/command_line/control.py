@@ -101,6 +101,7 @@ def design(
         from controllers.design_file import design as design_controller
         from controllers.design_file import gains, write_design
         from studies.design_text import design_texts
+        from studies.sample_times import require_multiple
         from studies.specification import design_numbers, read_specification
         from workbench.rig import load_rig
 
@@ -110,10 +111,12 @@ def design(
         numbers = design_numbers(asked, controller, known.plant) if asked else {}
         say(f"designing {controller}")
         found = design_controller(controller, known.plant, numbers)
+        require_multiple(known.plant, found.controller.sample_time_s, f"{controller}.sample_time_s")
+        told = [*design_texts(found, say)]  # before the file: what cannot be told is not written
         write_design(found, output)
         for name, gain in gains(found.controller):
             typer.echo(f"{name}: {gain}")
-        for part in design_texts(found, say):
+        for part in told:
             typer.echo(part)
         typer.echo(f"wrote {output}")
         if asked and asked.asked:
