@@ -7,8 +7,8 @@ follow from the rest, so reading designs anew: a file cannot say one thing and d
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from controllers import CONTROLLERS
-from controllers.spec import farthest, replaced
+from controllers.spec import Range, farthest, replaced
 from linearize.modes import HybridModel
 from linearize.standard import (
     AXIS_MODES,
@@ -35,8 +35,8 @@ from workbench.errors import InputError, Message, UnknownNameError, listed, near
 from workbench.plant import Plant
 from workbench.plant_files import as_it_came, plant_named, plant_text
 from workbench.rig_laws import laws_of, with_laws
-from workbench.rig_text import quoted
-from workbench.units import suffix
+from workbench.rig_text import RigText, quoted, read_text
+from workbench.units import si_unit, suffix
 
 PLANTS = {
     slide_modes: SLIDE_MODES,
@@ -122,7 +122,7 @@ def write_design(found: Design, path: Path) -> None:
 
 def read_design(path: Path) -> Design:
     """The design of a file, built anew; as :func:`parse_design`."""
-    return parse_design(path.read_text(encoding="utf-8"), path)
+    return parse_design(read_text(path)[0], path)
 
 
 def parse_design(text: str, path: Path) -> Design:
@@ -130,23 +130,77 @@ def parse_design(text: str, path: Path) -> Design:
 
     Raises
     ------
-    ValueError
-        If it is no TOML, or a table or a key is missing.
-    UnknownNameError
-        If it names something that does not exist.
+    InputError
+        With all that is wrong in the file, by line: it is no TOML, a key is missing, unknown or of
+        the wrong type, a name does not exist, or a number makes no sense.
     """
+    file = RigText(text, str(path), "a design file")
+    file.keys_among((), file.tree, ("controller", "plant", "spec"))
+    method = _needed(file, ("controller",), str, "", "the name of a controller")
+    plant = _plant(file, path.parent)
+    numbers = _needed(file, ("spec",), dict, {}, "a table of the controller's numbers")
+    file.finish()
+    with _placed(file, ("controller",), method):
+        return design(method, plant, numbers)
+
+
+def _needed(file: RigText, place: tuple[str, ...], kind: type, default: Any, expected: str) -> Any:
+    """What stands at a place; noted where nothing does, or something of another type."""
+    table = file.table(*place[:-1])
+    if place[-1] not in table:
+        file.wrong(place, "is missing", expected=expected)
+    return file.typed(place, kind, default, expected)
+
+
+def _plant(file: RigText, folder: Path) -> Plant | None:
+    """The plant of a file, none where it has no such plant; complaints go to the file."""
+    place = _needed(file, ("plant",), dict, {}, "a table with the plant's name and values")
+    if not place:
+        return None
+    file.keys_among(("plant",), place, ("name", "removed", "laws", "values"))
+    name = _needed(file, ("plant", "name"), str, "", "the name of a plant")
+    _needed(file, ("plant", "removed"), list, [], "a list of names")
+    removed, laws = (file.names(("plant", key)) for key in ("removed", "laws"))
+    values = _needed(file, ("plant", "values"), dict, {}, "a table of values in SI")
+    file.finish()
+    with _placed(file, ("plant", "name")):
+        plant = with_laws(plant_named(name, folder), laws)
+    known = [effect.name for effect in plant.effects]
+    for key, names in (("removed", removed), ("laws", laws)):
+        for each in names:
+            if each not in known:
+                file.unknown(("plant", key), plant.name, known, item=each)
+    file.finish()
+    return _with_values(file, plant.without(*removed), values)
+
+
+def _with_values(file: RigText, plant: Plant, values: Mapping[str, Any]) -> Plant:
+    for name, value in values.items():
+        place = ("plant", "values", name)
+        if name not in plant.values:
+            file.unknown(place, plant.name, plant.values)
+            continue
+        bounds = Range(plant.parameters[name].lower, plant.parameters[name].upper, above=False)
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        if not number or not bounds.holds(value):
+            expected = f"a number {bounds}, in {si_unit(name) or 'units of 1'}"
+            file.wrong(place, f"is {value!r}", expected=expected)
+    file.finish()
+    return plant.with_values(values)
+
+
+@contextmanager
+def _placed(file: RigText, usual: tuple[str, ...], method: str = "") -> Iterator[None]:
+    """Complaints of what is built from a file with their lines: of a number, else the usual one."""
+
+    def place(message: Message) -> tuple[str, ...]:
+        above, _, rest = message.name.partition(".")
+        return ("spec", *rest.split(".")) if method and above == method else usual
+
     try:
-        content = tomllib.loads(text)
-        method, place = content["controller"], content["plant"]
-        plant = with_laws(plant_named(place["name"], path.parent), place.get("laws", ()))
-        plant = plant.without(*place["removed"]).with_values(place["values"])
-        return design(method, plant, content["spec"])
-    except tomllib.TOMLDecodeError as error:
-        raise ValueError(f"{path.name}: {error}") from error
-    except KeyError as error:
-        if error.args[0] in ("controller", "plant", "name", "removed", "values", "spec"):
-            raise ValueError(f"{path.name} has no {error.args[0]}") from error
-        raise
+        yield
+    except InputError as error:
+        raise file.placed(error, place) from error
 
 
 def _lines(found: Design, folder: Path) -> Iterator[str]:

@@ -150,10 +150,14 @@ def test_a_number_that_makes_no_sense_is_named_with_what_was_expected(place, tmp
         (
             "lq",
             "sample_time_s = 0.0015",
-            "lq.sample_time_s: is 0.0015; expected a multiple of the 0.001 s at which servo_drive "
-            "is simulated, as 0.001 or 0.002",
+            "spec.toml:2: lq.sample_time_s: is 0.0015; expected a multiple of the 0.001 s at which "
+            "servo_drive is simulated, as 0.001 or 0.002",
         ),
-        ("lq", "position_m = 1e-30", "lq.position_m: is 1e-30, farthest of all numbers from usual"),
+        (
+            "lq",
+            "position_m = 1e-30",
+            "spec.toml:2: lq.position_m: is 1e-30, farthest of all numbers from usual",
+        ),
         ("lq", "position_m = 1e30\nsample_time_s = 0.05", "a number nearer to the usual 0.0015"),
         ("mpc", "position_m = 1e30", "mpc.position_m: is 1e+30, farthest of all numbers"),
     ],
