@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from controllers import CONTROLLERS
+from controllers.gain_text import gains
 from controllers.spec import Range, farthest, replaced
 from linearize.modes import HybridModel
 from linearize.standard import (
@@ -36,7 +37,7 @@ from workbench.plant import Plant
 from workbench.plant_files import as_it_came, plant_named, plant_text
 from workbench.rig_laws import laws_of, with_laws
 from workbench.rig_text import RigText, quoted, read_text
-from workbench.units import si_unit, suffix
+from workbench.units import si_unit
 
 PLANTS = {
     slide_modes: SLIDE_MODES,
@@ -244,20 +245,3 @@ def _table(name: str, spec: Any) -> Iterator[str]:
         else:
             yield f"\n[{key}]"
             yield from (f"{quoted(mode)} = {quoted(kind.value)}" for mode, kind in value.items())
-
-
-def gains(controller: Controller) -> Iterator[tuple[str, str]]:
-    """The numbers of each mode's design as text, forward then backward, where it has gains."""
-    schedule = getattr(controller, "gains", None)
-    if schedule is None:
-        return
-    axis = getattr(controller, "axis", None)
-    unit = suffix(axis.position if axis else getattr(controller, "signal", "place_m"))
-    for way in ("forward", "backward"):
-        for place, gain in zip(schedule.positions_m, getattr(schedule, way), strict=True):
-            values = (np.round(getattr(gain, f.name), 8) for f in fields(gain))
-            words = (f"{f.name} {v}" for f, v in zip(fields(gain), values, strict=True))
-            yield (
-                f"{way} at {place:.4g} {unit}",
-                "; ".join(" ".join(word.split()) for word in words),
-            )
