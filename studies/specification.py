@@ -29,7 +29,7 @@ from workbench.errors import InputError, Message, listed
 from workbench.plant import Plant, require
 from workbench.rig import Rig
 from workbench.rig_text import RigText, read_text
-from workbench.units import Scale, UnitError, public_name, quantity, scale, split
+from workbench.units import Scale, UnitError, public_name, quantity, scale, si_unit, split
 
 LIMITS = "limits"
 OVERSHOOT = "overshoot"
@@ -92,9 +92,9 @@ class Asked:
     @property
     def text(self) -> str:
         """What is asked for, in words."""
-        if self.least in (-inf, -self.most):
-            return f"at most {self.shown(self.most)}"
-        return f"{self.shown(self.least)} to {self.shown(self.most)}"
+        if self.least == -inf or (self.least == -self.most and si_unit(self.figure) == "Pa"):
+            return f"at most {self.shown(self.most)}"  # no absolute pressure is below 0
+        return f"{number(self.scale.from_si(self.least))} to {self.shown(self.most)}"
 
     def shown(self, value: float) -> str:
         """A value of the figure in the unit that was typed."""

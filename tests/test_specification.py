@@ -121,6 +121,22 @@ def test_one_sample_outside_a_limit_breaks_it_and_is_what_was_found(limit, state
     assert broken.verdicts[0].found == (outside,)
 
 
+@pytest.mark.parametrize(
+    ("limit", "text"),
+    [
+        ('slide.velocity = "1 m/s"', "-1 to 1 m/s"),
+        ('slide.velocity = ["-500 mm/s", "1 m/s"]', "-0.5 to 1 m/s"),
+        ('slide.position = ["10 mm", "280 mm"]', "10 to 280 mm"),
+        ('"chamber_a.pressure" = "7 bar"', "at most 7 bar"),
+        ('"chamber_a.pressure" = "6 bar_gauge"', "at most 6 bar_gauge"),
+    ],
+)
+def test_a_limit_of_a_state_with_a_sign_is_told_from_both_sides(limit, text):
+    (line,) = read_specification(f"[limits]\n{limit}\n", DRIVE).asked
+
+    assert line.text == text
+
+
 (SPEED,) = read_specification('[limits]\nslide.velocity = "2 m/s"\n', DRIVE).asked
 
 
