@@ -11,7 +11,7 @@ from slide_controllers import SLIDE_CONTROLLERS
 from controllers.condensed import MpcSpec, limits_of
 from controllers.design_file import read_design
 from linearize.axes import stroke_m
-from linearize.standard import SLIDE_MODES
+from linearize.standard import SLIDE_MODES, slide_modes
 from studies.checking import Loops, differences
 from studies.closed_loop_check import Check
 from studies.closed_loop_metrics import LOST_SHARE, Metrics, rise_s, table, valve_switches
@@ -87,16 +87,31 @@ def test_no_design_is_written_for_a_mode_that_its_command_cannot_steer(
     assert not written.exists()
 
 
-def test_a_plant_that_nothing_can_drive_is_refused_in_one_line(place, tmp_path):
-    """A supply at ambient pressure: no valve makes the slide move steadily."""
+@pytest.mark.parametrize(
+    ("plant", "enough"), [("servo_drive", "7"), ("crr_rig", "6.5"), ("gearbox", "9")]
+)
+@pytest.mark.parametrize("command", ["design", "modes"])
+def test_a_supply_that_moves_nothing_is_said_to_be_too_low(tmp_path, plant, command, enough):
+    """A supply little above ambient pressure: no valve makes anything move steadily."""
     weak = tmp_path / "weak.toml"
-    weak.write_text('plant = "servo_drive"\n[values]\n"supply.pressure" = "1.013 bar"\n')
-    answer = call("design", weak, "--controller", "lq", "-o", tmp_path / "lq.toml", "-q")
+    weak.write_text(f'plant = "{plant}"\n[values]\n"supply.pressure" = "1.1 bar"\n')
+    method = {"gearbox": "hybrid-mpc", "crr_rig": "axis-lq"}.get(plant, "lq")
+    more = ["--controller", method, "-o", tmp_path / "lq.toml"] if command == "design" else []
+    answer = call(command, weak, *more, "-q")
     (line,) = answer.stderr.splitlines()
 
     assert answer.exit_code == 2
-    assert "servo_drive: no operating point at slide.position_m 0.04833, slide.velo" in line
-    assert "slide.velocity_m_s, chamber_a.pressure_pa and chamber_b.pressure_pa stand still" in line
+    assert line.startswith("workbench: supply.pressure: 1.1 bar is too low to move: ")
+    assert line.endswith(f"; expected more, as {enough} bar")
+
+
+def test_a_point_that_is_missing_for_another_reason_is_not_blamed_on_the_supply(monkeypatch):
+    def stuck(plant):
+        raise ValueError("servo_drive: no operating point at all")
+
+    monkeypatch.setitem(SLIDE_MODES, "servo_drive", stuck)
+    with pytest.raises(ValueError, match=r"^servo_drive: no operating point at all$"):
+        slide_modes(PLANT.with_values({"supply.pressure_pa": 1.1e5}))
 
 
 def test_a_design_for_another_plant_is_refused(place, monkeypatch):
