@@ -16,7 +16,8 @@ from estimators.scheduled_kalman import ScheduledKalman
 from studies.closed_loop_check import every_loop
 from studies.closed_loop_metrics import air_used_kg
 from studies.following import BAND, BENCHES, Task, leg_of
-from studies.text import columns, number, shown
+from studies.tables import NEVER
+from studies.text import clock, columns, number, shown
 from workbench.closed_loop import Hardware, LoopRecord, close_loop
 from workbench.contracts import Command, Controller, Estimate, Estimator
 from workbench.filtering import consistent_start
@@ -245,20 +246,26 @@ _KINDS: dict[str, Callable[[Plant, LoopRecord, Task, float], Figures]] = {
     "soft_joint": _step,
 }
 
-HEAD = ("design", "estimator", "scenario", "figure", "found", "at most", "met", "ctrl us", "p99 us")
+HEAD = ("design", "estimator", "scenario", "figure", "found", "at most", "met")
 
 
 def following_table(rows: Iterable[Followed]) -> str:
     """The runs as text."""
-    return columns(HEAD, [line for row in rows for line in _lines(row)])
+    rows = [*rows]
+    median, high = (row.solve_median_s for row in rows), (row.solve_p99_s for row in rows)
+    clocks = (clock("ctrl", median), clock("p99", high))
+    head = (*HEAD, *(label for label, _ in clocks))
+    factors = [factor for _, factor in clocks]
+    return columns(head, [line for row in rows for line in _lines(row, *factors)])
 
 
-def _lines(row: Followed) -> Iterable[tuple[str, ...]]:
-    times = (number(1e6 * row.solve_median_s, 3), number(1e6 * row.solve_p99_s, 3))
+def _lines(row: Followed, median: float, high: float) -> Iterable[tuple[str, ...]]:
+    times = (number(median * row.solve_median_s, 3), number(high * row.solve_p99_s, 3))
     for name, most in row.asked.items():
         found = row.figures[name]
         unit = suffix(name)
         words = name.removesuffix(f"_{unit}").replace("_", " ")
         met = "yes" if found <= most else "no"
-        told = (words, shown(found, name), shown(most, name), met)
+        said = NEVER if found == np.inf else shown(found, name)
+        told = (words, said, shown(most, name), met)
         yield (row.design, row.estimator, row.scenario, *told, *times)

@@ -20,7 +20,7 @@ from controllers.shift_prediction import drives
 from estimators.shift_filter import ShiftFilter
 from linearize.shift_sample import half_stroke_m
 from linearize.shifting import POSITION, PRESSURES, VELOCITY
-from studies.text import columns, number
+from studies.text import clock, columns, number, until
 from workbench.closed_loop import Hardware, LoopRecord, close_loop
 from workbench.contracts import Command, Controller, Estimate
 from workbench.filtering import consistent_start
@@ -232,19 +232,23 @@ def impact_m_s(record: LoopRecord, end_m: float) -> float:
 
 
 HEAD = ("design", "shift", "reached", "settle ms", "at most", "impact m/s", "at most",
-        "over mm", "air g", "switches", "ctrl us", "p99 us")  # fmt: skip
+        "over mm", "air g", "switches")  # fmt: skip
 
 
 def shift_table(rows: Iterable[Shift]) -> str:
     """The shifts as text, with the bounds beside what they bound."""
-    return columns(HEAD, [_row(row) for row in rows])
+    rows = [*rows]
+    median, high = (row.solve_median_s for row in rows), (row.solve_p99_s for row in rows)
+    clocks = (clock("ctrl", median), clock("p99", high))
+    head = (*HEAD, *(label for label, _ in clocks))
+    return columns(head, [_row(row, *(factor for _, factor in clocks)) for row in rows])
 
 
-def _row(row: Shift) -> tuple[str, ...]:
+def _row(row: Shift, median: float, high: float) -> tuple[str, ...]:
     numbers = (
-        1e3 * row.settling_s, 1e3 * row.longest_s, row.impact_m_s, row.hardest_m_s,
+        1e3 * row.longest_s, row.impact_m_s, row.hardest_m_s,
         1e3 * row.overshoot_m, 1e3 * row.air_kg, row.switches,
-        1e6 * row.solve_median_s, 1e6 * row.solve_p99_s,
+        median * row.solve_median_s, high * row.solve_p99_s,
     )  # fmt: skip
     words = (row.design, row.scenario, "yes" if row.reached else "no")
-    return (*words, *(number(value, 4) for value in numbers))
+    return (*words, until(1e3 * row.settling_s), *(number(value, 4) for value in numbers))

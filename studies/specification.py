@@ -23,7 +23,7 @@ from studies.following import BENCHES
 from studies.following_check import Followed, tasks_of
 from studies.scenarios import SCENARIOS
 from studies.shift_check import SHIFTS
-from studies.text import number
+from studies.text import number, until
 from workbench.closed_loop import LoopRecord
 from workbench.errors import InputError, Message, listed
 from workbench.plant import Plant, require
@@ -98,6 +98,8 @@ class Asked:
 
     def shown(self, value: float) -> str:
         """A value of the figure in the unit that was typed."""
+        if not isfinite(value):
+            return until(value)
         return f"{number(self.scale.from_si(value))} {self.unit}".strip()
 
 

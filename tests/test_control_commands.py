@@ -212,6 +212,15 @@ def test_only_a_reference_that_ends_at_rest_has_a_goal_and_any_can_be_lost():
     assert [line.split()[3] for line in lines] == ["reached", "yes", "no", "-"]
 
 
+def test_long_steps_of_a_controller_and_steps_that_never_settle_are_told_in_plain_numbers():
+    slow = replace(GOOD, settling_s=float("inf"), solve_median_s=38.43e-3, solve_p99_s=74e-3)
+    head, line = table([slow]).splitlines()
+
+    assert "ctrl ms" in head and "p99 ms" in head and "est us" in head
+    assert line.split()[6] == "never" and line.split()[-3:-1] == ["38.43", "74"]
+    assert "e+" not in line and "inf" not in line
+
+
 def test_a_diverged_run_has_not_reached_anything():
     assert row("step", NONE, NONE, NONE, NONE).reached is False
     assert replace(FOLLOWED, rmse_m=NONE).reached is False

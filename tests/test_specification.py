@@ -155,6 +155,12 @@ def test_a_state_that_is_not_a_number_keeps_no_limit():
     assert not answered('[limits]\n"slide.velocity" = "9 m/s"', row(), records=[broken]).met
 
 
+def test_what_never_settles_is_said_so():
+    judged = answered('settling_time = "150 ms"', row(settling_s=inf))
+
+    assert judged.text.splitlines()[-1].split()[-2:] == ["never", "no"]
+
+
 def test_a_line_is_judged_where_it_means_something():
     """A rise in steps, tracking in sines, air and limits everywhere."""
     text = (
