@@ -11,7 +11,7 @@ from slide_controllers import SLIDE_CONTROLLERS
 from controllers.condensed import MpcSpec, limits_of
 from controllers.design_file import read_design
 from linearize.axes import stroke_m
-from linearize.standard import SLIDE_MODES, slide_modes
+from linearize.standard import SLIDE_MODES
 from studies.checking import Loops, differences
 from studies.closed_loop_check import Check
 from studies.closed_loop_metrics import LOST_SHARE, Metrics, rise_s, table, valve_switches
@@ -87,33 +87,6 @@ def test_no_design_is_written_for_a_mode_that_its_command_cannot_steer(
     assert not written.exists()
 
 
-@pytest.mark.parametrize(
-    ("plant", "enough"), [("servo_drive", "7"), ("crr_rig", "6.5"), ("gearbox", "9")]
-)
-@pytest.mark.parametrize("command", ["design", "modes"])
-def test_a_supply_that_moves_nothing_is_said_to_be_too_low(tmp_path, plant, command, enough):
-    """A supply little above ambient pressure: no valve makes anything move steadily."""
-    weak = tmp_path / "weak.toml"
-    weak.write_text(f'plant = "{plant}"\n[values]\n"supply.pressure" = "1.1 bar"\n')
-    method = {"gearbox": "hybrid-mpc", "crr_rig": "axis-lq"}.get(plant, "lq")
-    more = ["--controller", method, "-o", tmp_path / "lq.toml"] if command == "design" else []
-    answer = call(command, weak, *more, "-q")
-    (line,) = answer.stderr.splitlines()
-
-    assert answer.exit_code == 2
-    assert line.startswith("workbench: supply.pressure: 1.1 bar is too low to move: ")
-    assert line.endswith(f"; expected more, as {enough} bar")
-
-
-def test_a_point_that_is_missing_for_another_reason_is_not_blamed_on_the_supply(monkeypatch):
-    def stuck(plant):
-        raise ValueError("servo_drive: no operating point at all")
-
-    monkeypatch.setitem(SLIDE_MODES, "servo_drive", stuck)
-    with pytest.raises(ValueError, match=r"^servo_drive: no operating point at all$"):
-        slide_modes(PLANT.with_values({"supply.pressure_pa": 1.1e5}))
-
-
 def test_a_design_for_another_plant_is_refused(place, monkeypatch):
     from studies import checking
 
@@ -157,50 +130,6 @@ def test_a_number_that_makes_no_sense_is_named_with_what_was_expected(place, tmp
     assert answer.exit_code == 2
     assert said in answer.stderr
     assert [p.name for p in tmp_path.iterdir()] == ["spec.toml"]
-
-
-@pytest.mark.parametrize(
-    ("method", "numbers", "said"),
-    [
-        (
-            "lq",
-            "sample_time_s = 0.0015",
-            "spec.toml:2: lq.sample_time_s: is 0.0015; expected a multiple of the 0.001 s at which "
-            "servo_drive is simulated, as 0.001 or 0.002",
-        ),
-        (
-            "lq",
-            "position_m = 1e-30",
-            "spec.toml:2: lq.position_m: is 1e-30, farthest of all numbers from usual",
-        ),
-        ("lq", "position_m = 1e30\nsample_time_s = 0.05", "a number nearer to the usual 0.0015"),
-        ("mpc", "position_m = 1e30", "mpc.position_m: is 1e+30, farthest of all numbers"),
-    ],
-)
-def test_no_design_is_written_where_a_number_leads_nowhere(place, tmp_path, method, numbers, said):
-    spec = tmp_path / "spec.toml"
-    spec.write_text(f"[{method}]\n{numbers}\n")
-    answer = call(
-        "design", place / "servo_drive.toml", "--controller", method, "--spec", spec,
-        "-o", tmp_path / "design.toml", "-q",
-    )  # fmt: skip
-
-    assert answer.exit_code == 2
-    assert said in answer.stderr and len(answer.stderr.splitlines()) == 1
-    assert [p.name for p in tmp_path.iterdir()] == ["spec.toml"]
-
-
-def test_no_design_is_written_where_nothing_can_be_told_of_it(place, tmp_path, monkeypatch):
-    def failing(found, say):
-        raise ValueError("Invalid inputs.")
-        yield
-
-    monkeypatch.setattr("studies.design_text.design_texts", failing)
-    answer = call(
-        "design", place / "servo_drive.toml", "--controller", "lq", "-o", tmp_path / "lq.toml"
-    )
-
-    assert answer.exit_code == 2 and not [*tmp_path.iterdir()]
 
 
 def test_only_a_reference_that_ends_at_rest_has_a_goal_and_any_can_be_lost():

@@ -286,17 +286,6 @@ def test_the_table_beside_a_figure_holds_what_is_drawn(figures, tmp_path):
     assert ",validation,= chamber_leak@chamber_a,91" in rows
 
 
-def test_a_panel_has_one_line_in_the_table_where_its_label_has_two(tmp_path):
-    with styled():
-        figure = new_figure(3.5, 2.0)
-        axes = figure.subplots()
-        axes.plot([0, 1], [0, 1], label="line")
-        axes.set_ylabel("valve command\n(V)")
-    save(figure, tmp_path / "one", "x")
-
-    assert (tmp_path / "one.csv").read_text().splitlines()[1] == "valve command (V),line,0,0"
-
-
 def test_two_runs_give_the_same_bytes(tmp_path):
     def drawn(stem):
         with styled():
