@@ -192,8 +192,8 @@ CLOCKS = {"solve_median_s": "ctrl", "solve_p99_s": "p99", "estimate_median_s": "
 def table(rows: Iterable[Metrics]) -> str:
     """The rows as text, one line each, in millimetres, milliseconds and grams."""
     rows = [*rows]
-    clocks = {key: clock(name, (getattr(r, key) for r in rows)) for key, name in CLOCKS.items()}
-    shown = {**COLUMNS, **clocks}
+    unit, factor = clock(getattr(row, key) for row in rows for key in CLOCKS)
+    shown = COLUMNS | {key: (f"{name} {unit}", factor) for key, name in CLOCKS.items()}
     head = [*LABELS, "reached", *(label for label, _ in shown.values())]
     lines = []
     for row in rows:

@@ -252,15 +252,14 @@ HEAD = ("design", "estimator", "scenario", "figure", "found", "at most", "met")
 def following_table(rows: Iterable[Followed]) -> str:
     """The runs as text."""
     rows = [*rows]
-    median, high = (row.solve_median_s for row in rows), (row.solve_p99_s for row in rows)
-    clocks = (clock("ctrl", median), clock("p99", high))
-    head = (*HEAD, *(label for label, _ in clocks))
-    factors = [factor for _, factor in clocks]
-    return columns(head, [line for row in rows for line in _lines(row, *factors)])
+    unit, factor = clock(row.solve_p99_s for row in rows)
+    head = (*HEAD, f"ctrl {unit}", f"p99 {unit}")
+    return columns(head, [line for row in rows for line in _lines(row, factor)])
 
 
-def _lines(row: Followed, median: float, high: float) -> Iterable[tuple[str, ...]]:
-    times = (number(median * row.solve_median_s, 3), number(high * row.solve_p99_s, 3))
+def _lines(row: Followed, factor: float) -> Iterable[tuple[str, ...]]:
+    """With wall times by the factor of their unit."""
+    times = (number(factor * row.solve_median_s), number(factor * row.solve_p99_s))
     for name, most in row.asked.items():
         found = row.figures[name]
         unit = suffix(name)

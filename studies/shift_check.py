@@ -238,17 +238,17 @@ HEAD = ("design", "shift", "reached", "settle ms", "at most", "impact m/s", "at 
 def shift_table(rows: Iterable[Shift]) -> str:
     """The shifts as text, with the bounds beside what they bound."""
     rows = [*rows]
-    median, high = (row.solve_median_s for row in rows), (row.solve_p99_s for row in rows)
-    clocks = (clock("ctrl", median), clock("p99", high))
-    head = (*HEAD, *(label for label, _ in clocks))
-    return columns(head, [_row(row, *(factor for _, factor in clocks)) for row in rows])
+    unit, factor = clock(row.solve_p99_s for row in rows)
+    head = (*HEAD, f"ctrl {unit}", f"p99 {unit}")
+    return columns(head, [_row(row, factor) for row in rows])
 
 
-def _row(row: Shift, median: float, high: float) -> tuple[str, ...]:
+def _row(row: Shift, factor: float) -> tuple[str, ...]:
+    """With wall times by the factor of their unit."""
     numbers = (
         1e3 * row.longest_s, row.impact_m_s, row.hardest_m_s,
         1e3 * row.overshoot_m, 1e3 * row.air_kg, row.switches,
-        median * row.solve_median_s, high * row.solve_p99_s,
+        factor * row.solve_median_s, factor * row.solve_p99_s,
     )  # fmt: skip
     words = (row.design, row.scenario, "yes" if row.reached else "no")
     return (*words, until(1e3 * row.settling_s), *(number(value, 4) for value in numbers))

@@ -9,7 +9,7 @@ from studies.tables import NEVER, Table, note
 from workbench.diagnosis.result import told
 from workbench.units import display_scale, display_unit, public_name
 
-LONG_S = 1e-3
+LONG_S = 9e-3  # above, a number of microseconds has more than four digits
 
 
 def columns(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
@@ -31,10 +31,10 @@ def until(value: float, digits: int = 4) -> str:
     return NEVER if value == inf else number(value, digits)
 
 
-def clock(name: str, times_s: Iterable[float]) -> tuple[str, float]:
-    """Head and factor of a column of wall times: us, or ms where one takes as long."""
+def clock(times_s: Iterable[float]) -> tuple[str, float]:
+    """The unit of the wall times of a table, and its factor: us, or ms where one takes long."""
     longest_s = max((time_s for time_s in times_s if isfinite(time_s)), default=0.0)
-    return (f"{name} ms", 1e3) if longest_s >= LONG_S else (f"{name} us", 1e6)
+    return ("ms", 1e3) if longest_s >= LONG_S else ("us", 1e6)
 
 
 def percent(share: float, digits: int = 0) -> str:

@@ -59,7 +59,7 @@ def test_names_that_begin_with_a_digit_are_words_and_never_is_a_number():
     ]
 
 
-def test_a_column_of_wall_times_is_in_the_unit_that_needs_no_exponent():
-    assert clock("ctrl", [65e-6, 160e-6]) == ("ctrl us", 1e6)
-    assert clock("ctrl", [65e-6, 38.43e-3]) == ("ctrl ms", 1e3)
-    assert clock("ctrl", []) == ("ctrl us", 1e6)
+def test_wall_times_are_in_the_unit_that_needs_no_exponent():
+    assert clock([65e-6, 160e-6]) == ("us", 1e6)
+    assert clock([65e-6, 38.43e-3]) == ("ms", 1e3)
+    assert clock([]) == ("us", 1e6)
