@@ -47,6 +47,8 @@ class Certificate:
     breaking       pairs of modes that have no common function under every mix of their gains
     dwell_s        shortest time in a mode that is certified; 0 with a common function, None where
                    nothing is
+    any_switching  whether every switching is certified: by one function, or as the dwell time is
+                   one sample
     """
 
     modes: tuple[str, ...]
@@ -56,6 +58,7 @@ class Certificate:
     decay_per_s: float
     breaking: tuple[tuple[str, str], ...]
     dwell_s: float | None
+    any_switching: bool = False
 
 
 def certificate(loops: Loops, sample_time_s: float) -> Certificate:
@@ -70,7 +73,7 @@ def certificate(loops: Loops, sample_time_s: float) -> Certificate:
     everything = [A for each in loops.values() for A in each]
     if (P := common_function(everything)) is not None:
         decay = _decay_per_s(P, everything, sample_time_s)
-        return Certificate(names, (), P, True, decay, (), 0.0)
+        return Certificate(names, (), P, True, decay, (), 0.0, True)
     breaking = tuple(
         (one, other)
         for one, other in combinations(names, 2)
@@ -79,10 +82,10 @@ def certificate(loops: Loops, sample_time_s: float) -> Certificate:
     own = [loops[name][0] for name in names]
     if (P := common_function(own)) is not None:
         decay = _decay_per_s(P, own, sample_time_s)
-        return Certificate(names, (), P, False, decay, breaking, 0.0)
+        return Certificate(names, (), P, False, decay, breaking, 0.0, True)
     samples = dwell_samples(own)
     dwell_s = None if samples is None else samples * sample_time_s
-    return Certificate(names, (), None, False, 0.0, breaking, dwell_s)
+    return Certificate(names, (), None, False, 0.0, breaking, dwell_s, samples == 1)
 
 
 def common_function(loops: list[np.ndarray]) -> np.ndarray | None:

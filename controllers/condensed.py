@@ -17,6 +17,7 @@ from linearize.axes import stroke_m
 from linearize.discrete import sampled
 from linearize.modes import Mode
 from linearize.standard import PRESSURES, SUPPLY, VELOCITY
+from workbench.errors import InputError, Message
 from workbench.plant import Plant
 
 SLACK_UNIT = np.array([1e-3, 0.1, 1e4, 1e4])  # m, m/s, Pa, Pa: violations that cost alike
@@ -244,7 +245,7 @@ def limits_of(plant: Plant, spec: MpcSpec) -> np.ndarray:
 
     Raises
     ------
-    ValueError
+    InputError
         If nothing is left between them.
     """
     highest_pa = float(plant.values[SUPPLY]) - spec.below_supply_pa
@@ -253,7 +254,8 @@ def limits_of(plant: Plant, spec: MpcSpec) -> np.ndarray:
     if not np.less(low, high).all():
         what = f"margin_m {spec.margin_m:g}, lowest_pa {spec.lowest_pa:g} and below_supply_pa "
         what += f"{spec.below_supply_pa:g} leave no room on {plant.name}"
-        raise ValueError(f"mpc: {what}; expected less than half the stroke and the supply pressure")
+        expected = "less than half the stroke and the supply pressure"
+        raise InputError(Message(what, "mpc", expected))
     return np.array([low, high])
 
 

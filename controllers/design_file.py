@@ -7,8 +7,8 @@ follow from the rest, so reading designs anew: a file cannot say one thing and d
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 
 from controllers import CONTROLLERS
-from controllers.spec import replaced
+from controllers.gain_text import gains
+from controllers.spec import Range, farthest, replaced
 from linearize.modes import HybridModel
 from linearize.standard import (
     AXIS_MODES,
@@ -31,12 +32,12 @@ from linearize.standard import (
     vessel_modes,
 )
 from workbench.contracts import Controller
-from workbench.errors import Message, UnknownNameError, listed, nearest, whole_file
+from workbench.errors import InputError, Message, UnknownNameError, listed, nearest, whole_file
 from workbench.plant import Plant
 from workbench.plant_files import as_it_came, plant_named, plant_text
 from workbench.rig_laws import laws_of, with_laws
-from workbench.rig_text import quoted
-from workbench.units import suffix
+from workbench.rig_text import RigText, quoted, read_text
+from workbench.units import si_unit
 
 PLANTS = {
     slide_modes: SLIDE_MODES,
@@ -84,7 +85,20 @@ def design(method: str, plant: Plant, numbers: Mapping[str, Any] | None = None) 
         hybrid = found.modes(plant)
     except UnknownNameError as error:
         raise UnknownNameError(f"{error}; {_offered(plant)}") from error
-    return Design(method, plant, spec, hybrid, found.design(hybrid, spec))
+    try:
+        return Design(method, plant, spec, hybrid, found.design(hybrid, spec))
+    except np.linalg.LinAlgError as error:
+        raise _blamed(spec, method, error) from error
+
+
+def _blamed(spec: Any, method: str, error: Exception) -> Exception:
+    """The error by the number that is farthest from its usual value; itself where all are usual."""
+    name = farthest(spec)
+    if not name:
+        return error
+    value, usual = getattr(spec, name), getattr(type(spec)(), name)
+    what = f"is {value:g}, farthest of all numbers from usual, and the design fails: {error}"
+    return InputError(Message(what, f"{method}.{name}", f"a number nearer to the usual {usual:g}"))
 
 
 def methods_of(plant: Plant) -> list[str]:
@@ -109,7 +123,7 @@ def write_design(found: Design, path: Path) -> None:
 
 def read_design(path: Path) -> Design:
     """The design of a file, built anew; as :func:`parse_design`."""
-    return parse_design(path.read_text(encoding="utf-8"), path)
+    return parse_design(read_text(path)[0], path)
 
 
 def parse_design(text: str, path: Path) -> Design:
@@ -117,23 +131,77 @@ def parse_design(text: str, path: Path) -> Design:
 
     Raises
     ------
-    ValueError
-        If it is no TOML, or a table or a key is missing.
-    UnknownNameError
-        If it names something that does not exist.
+    InputError
+        With all that is wrong in the file, by line: it is no TOML, a key is missing, unknown or of
+        the wrong type, a name does not exist, or a number makes no sense.
     """
+    file = RigText(text, str(path), "a design file")
+    file.keys_among((), file.tree, ("controller", "plant", "spec"))
+    method = _needed(file, ("controller",), str, "", "the name of a controller")
+    plant = _plant(file, path.parent)
+    numbers = _needed(file, ("spec",), dict, {}, "a table of the controller's numbers")
+    file.finish()
+    with _placed(file, ("controller",), method):
+        return design(method, plant, numbers)
+
+
+def _needed(file: RigText, place: tuple[str, ...], kind: type, default: Any, expected: str) -> Any:
+    """What stands at a place; noted where nothing does, or something of another type."""
+    table = file.table(*place[:-1])
+    if place[-1] not in table:
+        file.wrong(place, "is missing", expected=expected)
+    return file.typed(place, kind, default, expected)
+
+
+def _plant(file: RigText, folder: Path) -> Plant | None:
+    """The plant of a file, none where it has no such plant; complaints go to the file."""
+    place = _needed(file, ("plant",), dict, {}, "a table with the plant's name and values")
+    if not place:
+        return None
+    file.keys_among(("plant",), place, ("name", "removed", "laws", "values"))
+    name = _needed(file, ("plant", "name"), str, "", "the name of a plant")
+    _needed(file, ("plant", "removed"), list, [], "a list of names")
+    removed, laws = (file.names(("plant", key)) for key in ("removed", "laws"))
+    values = _needed(file, ("plant", "values"), dict, {}, "a table of values in SI")
+    file.finish()
+    with _placed(file, ("plant", "name")):
+        plant = with_laws(plant_named(name, folder), laws)
+    known = [effect.name for effect in plant.effects]
+    for key, names in (("removed", removed), ("laws", laws)):
+        for each in names:
+            if each not in known:
+                file.unknown(("plant", key), plant.name, known, item=each)
+    file.finish()
+    return _with_values(file, plant.without(*removed), values)
+
+
+def _with_values(file: RigText, plant: Plant, values: Mapping[str, Any]) -> Plant:
+    for name, value in values.items():
+        place = ("plant", "values", name)
+        if name not in plant.values:
+            file.unknown(place, plant.name, plant.values)
+            continue
+        bounds = Range(plant.parameters[name].lower, plant.parameters[name].upper, above=False)
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        if not number or not bounds.holds(value):
+            expected = f"a number {bounds}, in {si_unit(name) or 'units of 1'}"
+            file.wrong(place, f"is {value!r}", expected=expected)
+    file.finish()
+    return plant.with_values(values)
+
+
+@contextmanager
+def _placed(file: RigText, usual: tuple[str, ...], method: str = "") -> Iterator[None]:
+    """Complaints of what is built from a file with their lines: of a number, else the usual one."""
+
+    def place(message: Message) -> tuple[str, ...]:
+        above, _, rest = message.name.partition(".")
+        return ("spec", *rest.split(".")) if method and above == method else usual
+
     try:
-        content = tomllib.loads(text)
-        method, place = content["controller"], content["plant"]
-        plant = with_laws(plant_named(place["name"], path.parent), place.get("laws", ()))
-        plant = plant.without(*place["removed"]).with_values(place["values"])
-        return design(method, plant, content["spec"])
-    except tomllib.TOMLDecodeError as error:
-        raise ValueError(f"{path.name}: {error}") from error
-    except KeyError as error:
-        if error.args[0] in ("controller", "plant", "name", "removed", "values", "spec"):
-            raise ValueError(f"{path.name} has no {error.args[0]}") from error
-        raise
+        yield
+    except InputError as error:
+        raise file.placed(error, place) from error
 
 
 def _lines(found: Design, folder: Path) -> Iterator[str]:
@@ -177,20 +245,3 @@ def _table(name: str, spec: Any) -> Iterator[str]:
         else:
             yield f"\n[{key}]"
             yield from (f"{quoted(mode)} = {quoted(kind.value)}" for mode, kind in value.items())
-
-
-def gains(controller: Controller) -> Iterator[tuple[str, str]]:
-    """The numbers of each mode's design as text, forward then backward, where it has gains."""
-    schedule = getattr(controller, "gains", None)
-    if schedule is None:
-        return
-    axis = getattr(controller, "axis", None)
-    unit = suffix(axis.position if axis else getattr(controller, "signal", "place_m"))
-    for way in ("forward", "backward"):
-        for place, gain in zip(schedule.positions_m, getattr(schedule, way), strict=True):
-            values = (np.round(getattr(gain, f.name), 8) for f in fields(gain))
-            words = (f"{f.name} {v}" for f, v in zip(fields(gain), values, strict=True))
-            yield (
-                f"{way} at {place:.4g} {unit}",
-                "; ".join(" ".join(word.split()) for word in words),
-            )

@@ -45,8 +45,8 @@ def joint_regulators(hybrid: HybridModel, spec: AxisLqSpec | None = None) -> Joi
 
     Raises
     ------
-    ValueError
-        If a mode cannot be stabilised.
+    NoGainError
+        If the regulator of these weights cannot be computed.
     """
     spec = spec or AxisLqSpec()
     pairs = ranges_of(hybrid.plant)

@@ -21,6 +21,10 @@ from linearize.modes import Mode
 from workbench.errors import InputError, Message, listed, nearest
 
 
+class NoGainError(np.linalg.LinAlgError):
+    """Weights that lead to no gains, though the mode can be steered."""
+
+
 @dataclass(frozen=True)
 class Gain:
     """Feedback of (position, velocity, pressure a, pressure b) and of the integral of the error.
@@ -50,8 +54,8 @@ def lq_gain(
     ------
     InputError
         If a name is none of the mode's, or the position or the command has no weight.
-    ValueError
-        If the mode cannot be stabilised.
+    NoGainError
+        If the regulator of these weights cannot be computed.
     """
     _require_weights(mode, tolerable)
     position = mode.state_names[0]
@@ -60,9 +64,11 @@ def lq_gain(
     R = np.array([[tolerable[mode.command_names[0]] ** -2.0]])
     F, G = with_integral(mode, sample_time_s)
     try:
-        K = dlqr(F, G, Q, R, np.array([*mode.scale, mode.scale[0]]))
-    except np.linalg.LinAlgError as error:
-        raise ValueError(f"mode {mode.name!r} cannot be stabilised by its command") from error
+        with np.errstate(invalid="raise"):  # what scipy would only warn of ends in zero gains
+            K = dlqr(F, G, Q, R, np.array([*mode.scale, mode.scale[0]]))
+    except (np.linalg.LinAlgError, FloatingPointError) as error:
+        what = f"mode {mode.name!r}: no gains can be computed from these weights"
+        raise NoGainError(what) from error
     return gain_of(F, G, K[0], sample_time_s)
 
 

@@ -140,8 +140,8 @@ def axis_regulator(hybrid: HybridModel, spec: AxisLqSpec | None = None) -> Regul
 
     Raises
     ------
-    ValueError
-        If a mode cannot be stabilised.
+    NoGainError
+        If the regulator of these weights cannot be computed.
     """
     ((axis, wide),) = ranges_of(hybrid.plant)
     return regulator_on(hybrid, axis, (spec or AxisLqSpec()).weighed(axis, wide))
@@ -159,8 +159,8 @@ def regulator_on(hybrid: HybridModel, axis: Axis, spec: RegulatorSpec) -> Regula
     ------
     InputError
         If a weight is for a signal that the modes do not have, or one is missing.
-    ValueError
-        If a mode cannot be stabilised.
+    NoGainError
+        If the regulator of these weights cannot be computed.
     """
     centre_v = closed_command(hybrid.plant, axis.command)
     weighed = (spec.tolerable, spec.integral_time_s, spec.sample_time_s)

@@ -1,7 +1,8 @@
 """Specifications: frozen dataclasses of numbers, each with the range in which it makes sense.
 
-A number is finite and above zero unless its field says otherwise by :func:`ranged`.  What is no
-number is one of a few named things for each mode: see :func:`chosen`.
+A number is finite and above zero unless its field says otherwise by :func:`ranged`; a sample time
+has one range everywhere.  What is no number is one of a few named things for each mode: see
+:func:`chosen`.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import Field, dataclass, field, fields, is_dataclass
 from enum import Enum
-from math import inf, isfinite
+from math import inf, isfinite, log
 from typing import Any
 
 from workbench.errors import InputError, Message, listed, nearest
@@ -31,6 +32,10 @@ class Range:
     def __str__(self) -> str:
         bottom = f"above {self.least:g}" if self.above else f"from {self.least:g}"
         return bottom + (f" to {self.most:g}" if self.most < inf else "")
+
+
+SAMPLE_TIMES = Range(1e-4, 5e-2, above=False)
+"""In s: below no computer keeps up, above a piston crosses its stroke between two samples."""
 
 
 def ranged(default: float, *, least: float = 0.0, most: float = inf, above: bool = False) -> Any:
@@ -55,6 +60,16 @@ def replaced(spec: Any, numbers: object, where: str) -> Any:
     if wrong:
         raise InputError(*wrong)
     return found
+
+
+def farthest(spec: Any) -> str:
+    """The number that is farthest from its usual value by their ratio; empty where none is off."""
+    usual, off = type(spec)(), {}
+    for each in fields(spec):
+        value, other = getattr(spec, each.name), getattr(usual, each.name)
+        if isinstance(value, int | float) and value != other and value > 0.0 and other > 0.0:
+            off[each.name] = abs(log(value) - log(other))
+    return max(off, key=off.__getitem__, default="")
 
 
 def _replaced(spec: Any, numbers: object, where: str) -> tuple[Any, list[Message]]:
@@ -99,7 +114,8 @@ def _choices(
 def _refused(known: Field, default: float, value: object) -> str:
     """What was expected in place of this value; empty where it is right."""
     whole = isinstance(default, int)
-    inside = known.metadata.get("range", Range())
+    usual = SAMPLE_TIMES if known.name == "sample_time_s" else Range()
+    inside = known.metadata.get("range", usual)
     number = isinstance(value, int | float) and not isinstance(value, bool)
     if number and inside.holds(value) and (not whole or value == round(value)):
         return ""

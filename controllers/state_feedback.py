@@ -89,8 +89,8 @@ def lq_state_feedback(hybrid: HybridModel, spec: LqSpec | None = None) -> StateF
 
     Raises
     ------
-    ValueError
-        If a mode cannot be stabilised.
+    NoGainError
+        If the regulator of these weights cannot be computed.
     """
     spec = spec or LqSpec()
     weighed = (spec.tolerable, spec.integral_time_s, spec.sample_time_s)

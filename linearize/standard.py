@@ -16,8 +16,10 @@ from linearize.modes import HybridModel, Interval, hybrid_modes
 from linearize.reduction import DesignModel, design_model
 from linearize.shift_modes import gearbox_modes
 from linearize.vessel_modes import bellows, filling_modes, reservoir
-from workbench.errors import UnknownNameError
+from workbench.errors import InputError, Message, UnknownNameError
 from workbench.plant import Plant
+from workbench.plant_files import as_it_came
+from workbench.units import public_name
 
 POSITION, VELOCITY = DRIVE.position, DRIVE.velocity
 PRESSURES = DRIVE.pressures
@@ -206,7 +208,29 @@ def shift_modes(plant: Plant) -> HybridModel:
 def _among(
     known: dict[str, Callable[[Plant], HybridModel]], plant: Plant, none: str
 ) -> HybridModel:
+    """The modes of a plant; where there are none, and more supply would do, that is said."""
     if plant.name not in known:
         names = ", ".join(known)
         raise UnknownNameError(f"{none} {plant.name}; there are some for {names}")
-    return known[plant.name](plant)
+    try:
+        return known[plant.name](plant)
+    except ValueError as error:
+        enough_pa = _enough_pa(known[plant.name], plant)
+        if enough_pa is None:
+            raise
+        said = str(error.args[0]).splitlines()[0]
+        what = f"{plant.values[SUPPLY] / 1e5:.4g} bar is too low to move: {said}"
+        expected = f"more, as {enough_pa / 1e5:.4g} bar"
+        raise InputError(Message(what, public_name(SUPPLY), expected)) from error
+
+
+def _enough_pa(modes: Callable[[Plant], HybridModel], plant: Plant) -> float | None:
+    """The supply that the plant comes with, where it is higher and alone makes its modes."""
+    usual_pa = as_it_came(plant).values.get(SUPPLY, 0.0)
+    if plant.values.get(SUPPLY, usual_pa) >= usual_pa:
+        return None
+    try:
+        modes(plant.with_values({SUPPLY: usual_pa}))
+    except ValueError:
+        return None
+    return usual_pa

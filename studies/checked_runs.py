@@ -26,6 +26,7 @@ from studies.specification import Specification
 from studies.verdicts import Figures, Judged, Verdict, judge
 from studies.workers import Workers
 from workbench.rig import Rig
+from workbench.rig_text import read_text
 from workbench.units import public_name
 
 if TYPE_CHECKING:
@@ -265,7 +266,7 @@ def check_rig(
         If there is one run only, and a loop of it is lost.
     """
     asked = spec.asked if spec else ()
-    text = design.read_text(encoding="utf-8")
+    text, _ = read_text(design)
     setup = Setup(rig, design, text, tuple(estimators), tuple(scenarios), tuple(asked))
     rows = rows_of(setup, runs, workers or Workers(1), keep, say)
     found = CheckedRuns(setup, tuple(rows), spec if asked else None)

@@ -22,6 +22,7 @@ from studies.figures.shifts import shift_figures
 from studies.figures.style import styled
 from studies.following import BENCHES
 from studies.following_check import RAW, FollowingCheck, check_followed, tasks_of
+from studies.sample_times import require_multiple
 from studies.scenarios import SCENARIOS
 from studies.shift_check import SHIFTS, ShiftCheck, check_shifts
 from studies.text import shown
@@ -29,6 +30,7 @@ from workbench.contracts import Controller
 from workbench.errors import InputError, Message, listed
 from workbench.plant import Plant, require
 from workbench.rig import Rig
+from workbench.rig_text import key_lines
 from workbench.units import public_name
 
 if TYPE_CHECKING:
@@ -150,6 +152,10 @@ def _controllers(rig: Rig, designs: Mapping[Path, str]) -> dict[str, Controller]
     if wrong:
         raise InputError(*wrong)
     for path, found in read.items():
+        line = key_lines(designs[path]).get(("spec", "sample_time_s"), 0)
+        require_multiple(
+            rig.plant, found.controller.sample_time_s, "sample_time_s", file=str(path), line=line
+        )
         if differing := differences(found.plant, rig.plant):
             what = f"{path}: designed for other values than those of {rig.name}: "
             warnings.warn(what + listed(differing, MOST_NAMED), stacklevel=4)

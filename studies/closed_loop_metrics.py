@@ -12,7 +12,7 @@ from linearize.axes import stroke_m
 from linearize.reduction import closed_command
 from linearize.standard import POSITION, PRESSURES, SUPPLY
 from studies.scenarios import LATE_S, SAMPLE_TIME_S, Scenario
-from studies.text import columns
+from studies.text import clock, columns, until
 from workbench.closed_loop import LoopRecord
 from workbench.plant import Plant
 
@@ -193,20 +193,20 @@ COLUMNS = {
     "activity_v": ("moves V", 1.0),
     "switches": ("switches", 1.0),
     "violation_s": ("limits ms", 1e3),
-    "solve_median_s": ("ctrl us", 1e6),
-    "solve_p99_s": ("p99 us", 1e6),
-    "estimate_median_s": ("est us", 1e6),
 }
+CLOCKS = {"solve_median_s": "ctrl", "solve_p99_s": "p99", "estimate_median_s": "est"}
 
 
 def table(rows: Iterable[Metrics]) -> str:
-    """The rows as text, one line each, in millimetres, milliseconds, grams and microseconds."""
-    head = [*LABELS, "reached", *(label for label, _ in COLUMNS.values())]
+    """The rows as text, one line each, in millimetres, milliseconds and grams."""
+    rows = [*rows]
+    unit, factor = clock(getattr(row, key) for row in rows for key in CLOCKS)
+    shown = COLUMNS | {key: (f"{name} {unit}", factor) for key, name in CLOCKS.items()}
+    head = [*LABELS, "reached", *(label for label, _ in shown.values())]
     lines = []
     for row in rows:
         words = [getattr(row, label) for label in LABELS]
         words.append(ANSWERS[row.reached])
-        values = [(getattr(row, key) * factor) for key, (_, factor) in COLUMNS.items()]
-        words += ["-" if np.isnan(value) else format(value, ".4g") for value in values]
+        words += [until(factor * getattr(row, key)) for key, (_, factor) in shown.items()]
         lines.append(words)
     return columns(head, lines)

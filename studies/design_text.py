@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator
 from math import degrees, isinf
 from typing import TYPE_CHECKING
 
+from studies.instability_text import UNSTABLE, unstable_text
 from studies.text import columns, number
 
 if TYPE_CHECKING:
@@ -25,10 +26,6 @@ HEAD = (
     "disk deg",
     "loop",
 )
-UNSTABLE = (
-    "unstable: an oscillation grows in the sampled loop of that mode, where dry friction is a "
-    "constant and takes no energy; `workbench check` says what the whole plant makes of it"
-)
 SCOPE = (
     "for the sampled loops without limits; while the valve is shut or brakes, nothing is claimed"
 )
@@ -36,7 +33,6 @@ NO_LAWS = (
     "no margins: the law is the plant's own model, not one linear law per mode; `workbench check` "
     "says what the whole plant makes of it"
 )
-MOST_PAIRS = 6  # that are named
 
 
 def design_texts(found: Design, say: Callable[[str], None]) -> Iterator[str]:
@@ -54,17 +50,21 @@ def design_texts(found: Design, say: Callable[[str], None]) -> Iterator[str]:
     for part in getattr(made, "regulators", (made,)):
         axis = getattr(part, "axis", None)
         loop = (found.hybrid, part.laws, made.sample_time_s, delay_s, axis)
-        yield margins_text(margins(*loop), delay_s)
+        closed = loops(*loop)
+        yield margins_text(margins(*loop), delay_s, unstable_text(closed, made.sample_time_s))
         say("looking for a certificate across modes")
-        yield certificate_text(certificate(loops(*loop), made.sample_time_s))
+        yield certificate_text(certificate(closed, made.sample_time_s))
 
 
-def margins_text(found: Iterable[Margins], delay_s: float = 0.0) -> str:
-    """One line per mode, a dash where the loop has no such margin, and what delay is in them."""
+def margins_text(found: Iterable[Margins], delay_s: float = 0.0, unstable: str = UNSTABLE) -> str:
+    """One line per mode, a dash where the loop has no such margin, and what delay is in them.
+
+    ``unstable`` says what an unstable loop does, and is told where there is one.
+    """
     found = [*found]
     lines = [columns(HEAD, [_row(each) for each in found])]
     lines += [f"with {1e3 * delay_s:g} ms of the sensors in the loop"] if delay_s else []
-    lines += [] if all(each.stable for each in found) else [UNSTABLE]
+    lines += [] if all(each.stable for each in found) else [unstable]
     return "\n".join(lines)
 
 
@@ -79,13 +79,18 @@ def certificate_text(found: Certificate) -> str:
         text += f"decay {number(found.decay_per_s, 3)} 1/s under any switching"
         if found.mixing:
             return f"{text} and mixing of gains; {SCOPE}"
-        alone = "each mode with its own gains, but not for every mix of them"
-        return f"{text}, {alone}, {_breaking(found.breaking)}; {SCOPE}"
-    text = f"no common quadratic Lyapunov function for {modes}: {_breaking(found.breaking)}"
+        alone = "each mode with its own gains; for every mix of them none was found, "
+        return f"{text}, {alone}{_breaking(found.breaking)}\n{SCOPE}"
+    text = f"no common quadratic Lyapunov function was found for {modes}, "
+    text += _breaking(found.breaking)
     if found.dwell_s is None:
-        return f"{text}; no dwell time was found either: no certificate across modes"
-    dwell = f"certified is a dwell time of {number(1e3 * found.dwell_s, 3)} ms in each mode"
-    return f"{text}; {dwell}, each with its own gains, {SCOPE}"
+        return f"{text}\nno dwell time was found either: no certificate across modes"
+    dwell = f"a dwell time of {number(1e3 * found.dwell_s, 3)} ms in each mode"
+    if found.any_switching:
+        dwell = (
+            f"any switching between the modes, from sample to sample too ({dwell} is one sample)"
+        )
+    return f"{text}\ncertified is {dwell}, each with its own gains, {SCOPE}"
 
 
 def search_text(made: HybridMpc) -> str:
@@ -103,11 +108,14 @@ def search_text(made: HybridMpc) -> str:
 
 
 def _breaking(pairs: tuple[tuple[str, str], ...]) -> str:
+    """For which pairs none was found, a line for each first of them."""
     if not pairs:
-        return "each pair has one, all together have none"
-    named = "; ".join(f"{one} with {other}" for one, other in pairs[:MOST_PAIRS])
-    more = len(pairs) - MOST_PAIRS
-    return f"broken by {named}" + (f" and {more} more" if more > 0 else "")
+        return "though for each pair of them"
+    others: dict[str, list[str]] = {}
+    for one, other in pairs:
+        others.setdefault(one, []).append(other)
+    lines = (f"  {one} with {'; '.join(several)}" for one, several in others.items())
+    return "\n".join(["not even for these pairs:", *lines])
 
 
 def _row(each: Margins) -> tuple[str, ...]:

@@ -16,7 +16,8 @@ from estimators.scheduled_kalman import ScheduledKalman
 from studies.closed_loop_check import every_loop
 from studies.closed_loop_metrics import air_used_kg, rise_s, step_figures, valve_switches
 from studies.following import BAND, BENCHES, WITHIN, Task, leg_of
-from studies.text import columns, number, shown
+from studies.tables import NEVER
+from studies.text import clock, columns, number, shown
 from workbench.closed_loop import Hardware, LoopRecord, close_loop
 from workbench.contracts import Command, Controller, Estimate, Estimator
 from workbench.filtering import consistent_start
@@ -259,20 +260,25 @@ _KINDS: dict[str, Callable[[Plant, LoopRecord, Task, float], Figures]] = {
     "soft_joint": _step,
 }
 
-HEAD = ("design", "estimator", "scenario", "figure", "found", "at most", "met", "ctrl us", "p99 us")
+HEAD = ("design", "estimator", "scenario", "figure", "found", "at most", "met")
 
 
 def following_table(rows: Iterable[Followed]) -> str:
     """The runs as text."""
-    return columns(HEAD, [line for row in rows for line in _lines(row)])
+    rows = [*rows]
+    unit, factor = clock(row.solve_p99_s for row in rows)
+    head = (*HEAD, f"ctrl {unit}", f"p99 {unit}")
+    return columns(head, [line for row in rows for line in _lines(row, factor)])
 
 
-def _lines(row: Followed) -> Iterable[tuple[str, ...]]:
-    times = (number(1e6 * row.solve_median_s, 3), number(1e6 * row.solve_p99_s, 3))
+def _lines(row: Followed, factor: float) -> Iterable[tuple[str, ...]]:
+    """With wall times by the factor of their unit."""
+    times = (number(factor * row.solve_median_s), number(factor * row.solve_p99_s))
     for name, most in row.asked.items():
         found = row.figures[name]
         unit = suffix(name)
         words = name.removesuffix(f"_{unit}").replace("_", " ")
         met = "yes" if found <= most else "no"
-        told = (words, shown(found, name), shown(most, name), met)
+        said = NEVER if found == np.inf else shown(found, name)
+        told = (words, said, shown(most, name), met)
         yield (row.design, row.estimator, row.scenario, *told, *times)

@@ -21,7 +21,7 @@ from controllers.shift_prediction import drives
 from estimators.shift_filter import ShiftFilter
 from linearize.shift_sample import half_stroke_m
 from linearize.shifting import POSITION, PRESSURES, VELOCITY
-from studies.text import columns, number
+from studies.text import clock, columns, number, until
 from workbench.closed_loop import Hardware, LoopRecord, close_loop
 from workbench.contracts import Command, Controller, Estimate
 from workbench.filtering import consistent_start
@@ -253,20 +253,24 @@ def impact_m_s(record: LoopRecord, end_m: float) -> float:
 
 HEAD = ("design", "shift", "reached", "settle ms", "bound of time ms", "open loop ms",
         "impact m/s", "bound of impact m/s", "open loop m/s",
-        "over mm", "air g", "switches", "ctrl us", "p99 us")  # fmt: skip
+        "over mm", "air g", "switches")  # fmt: skip
 
 
 def shift_table(rows: Iterable[Shift]) -> str:
     """The shifts as text, with bounds and open loop beside what they are for."""
-    return columns(HEAD, [_row(row) for row in rows])
+    rows = [*rows]
+    unit, factor = clock(row.solve_p99_s for row in rows)
+    head = (*HEAD, f"ctrl {unit}", f"p99 {unit}")
+    return columns(head, [_row(row, factor) for row in rows])
 
 
-def _row(row: Shift) -> tuple[str, ...]:
+def _row(row: Shift, factor: float) -> tuple[str, ...]:
+    """With wall times by the factor of their unit."""
     numbers = (
-        1e3 * row.settling_s, 1e3 * row.longest_s, 1e3 * row.open_settling_s,
+        1e3 * row.longest_s, 1e3 * row.open_settling_s,
         row.impact_m_s, row.hardest_m_s, row.open_impact_m_s,
         1e3 * row.overshoot_m, 1e3 * row.air_kg, row.switches,
-        1e6 * row.solve_median_s, 1e6 * row.solve_p99_s,
+        factor * row.solve_median_s, factor * row.solve_p99_s,
     )  # fmt: skip
     words = (row.design, row.scenario, "yes" if row.reached else "no")
-    return (*words, *(number(value, 4) for value in numbers))
+    return (*words, until(1e3 * row.settling_s), *(number(value, 4) for value in numbers))

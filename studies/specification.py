@@ -23,13 +23,13 @@ from studies.following import BENCHES, FOLLOWING_LINES, STEP_LINES
 from studies.following_check import Followed, tasks_of
 from studies.scenarios import SCENARIOS
 from studies.shift_check import SHIFTS
-from studies.text import number
+from studies.text import number, until
 from workbench.closed_loop import LoopRecord
 from workbench.errors import InputError, Message, listed
 from workbench.plant import Plant, require
 from workbench.rig import Rig
 from workbench.rig_text import RigText, read_text
-from workbench.units import Scale, UnitError, public_name, quantity, scale, split
+from workbench.units import Scale, UnitError, public_name, quantity, scale, si_unit, split
 
 LIMITS = "limits"
 OVERSHOOT = "overshoot"
@@ -93,12 +93,14 @@ class Asked:
     @property
     def text(self) -> str:
         """What is asked for, in words."""
-        if self.least in (-inf, -self.most):
-            return f"at most {self.shown(self.most)}"
-        return f"{self.shown(self.least)} to {self.shown(self.most)}"
+        if self.least == -inf or (self.least == -self.most and si_unit(self.figure) == "Pa"):
+            return f"at most {self.shown(self.most)}"  # no absolute pressure is below 0
+        return f"{number(self.scale.from_si(self.least))} to {self.shown(self.most)}"
 
     def shown(self, value: float) -> str:
         """A value of the figure in the unit that was typed."""
+        if not isfinite(value):
+            return until(value)
         return f"{number(self.scale.from_si(value))} {self.unit}".strip()
 
 

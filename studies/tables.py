@@ -7,6 +7,7 @@ of that text there, to be written beside it: a table has one source, whatever it
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -17,6 +18,8 @@ from pathlib import Path
 from workbench.errors import whole_file
 
 GAP = "  "
+NEVER = "never"  # stands for a number where something is not reached
+_NUMBER = re.compile(r"[-+]*\.?\d(?!.* [a-z]{4})")  # and what follows it, but no names: "1 slide +"
 _IN_LATEX = {
     "\\": r"\textbackslash{}", "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_",
     "{": r"\{", "}": r"\}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}",
@@ -99,7 +102,7 @@ def write_tables(text: str, noted: Iterable[Table], folder: Path) -> list[str]:
 
 
 def _numeric(word: str) -> bool:
-    return word == "-" or word.lstrip("-+").replace(" %", "").replace(".", "", 1)[:1].isdigit()
+    return word in ("-", NEVER) or bool(_NUMBER.match(word))
 
 
 def _latex(word: str) -> str:

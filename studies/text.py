@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from math import isfinite
+from math import inf, isfinite
 
-from studies.tables import Table, note
+from studies.tables import NEVER, Table, note
 from workbench.diagnosis.result import told
 from workbench.units import display_scale, display_unit, public_name
+
+LONG_S = 9e-3  # above, a number of microseconds has more than four digits
 
 
 def columns(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
@@ -22,6 +24,17 @@ def number(value: float, digits: int = 4) -> str:
     if not isfinite(value):
         return "-"
     return f"{value:.{digits}g}"
+
+
+def until(value: float, digits: int = 4) -> str:
+    """A time until something is reached, which may be never; a dash where there is none."""
+    return NEVER if value == inf else number(value, digits)
+
+
+def clock(times_s: Iterable[float]) -> tuple[str, float]:
+    """The unit of the wall times of a table, and its factor: us, or ms where one takes long."""
+    longest_s = max((time_s for time_s in times_s if isfinite(time_s)), default=0.0)
+    return ("ms", 1e3) if longest_s >= LONG_S else ("us", 1e6)
 
 
 def percent(share: float, digits: int = 0) -> str:

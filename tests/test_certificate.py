@@ -6,7 +6,7 @@ from crr_loops import ARM, TURNS
 from scipy.linalg import expm
 
 from controllers import CONTROLLERS
-from controllers.certificate import certificate, common_function, dwell_samples
+from controllers.certificate import Certificate, certificate, common_function, dwell_samples
 from controllers.margins import closed, integral_of, loops, unforeseen_s
 from controllers.regulator import RegulatorSpec, regulator
 from controllers.scheduled import driven_modes
@@ -52,7 +52,8 @@ def test_two_spirals_break_it_and_need_a_dwell_time():
     assert found.breaking == (("round", "flat"),)
     assert found.dwell_s > 1.0
     said = certificate_text(found)
-    assert "broken by round with flat" in said and "dwell time of" in said
+    assert "was found for the 2 modes above, not even for these pairs:\n  round with flat\n" in said
+    assert "certified is a dwell time of" in said and "any switching" not in said
 
 
 def test_no_switching_that_keeps_the_dwell_time_grows():
@@ -108,7 +109,47 @@ def test_gains_that_must_not_be_mixed_are_told_from_switching_that_may_be():
     assert found.common is not None and not found.mixing
     assert found.breaking == (("one", "other"),)
     said = certificate_text(found)
-    assert "each mode with its own gains" in said and "broken by one with other" in said
+    assert "each mode with its own gains; for every mix of them none was found" in said
+    assert said.splitlines()[1] == "  one with other"
+
+
+PAIRS = tuple((f"mode {one}", f"mode {other}") for one in range(4) for other in range(one + 1, 4))
+
+
+@pytest.mark.parametrize(
+    ("breaking", "any_switching", "said"),
+    [
+        (PAIRS, False, "  mode 0 with mode 1; mode 2; mode 3\n  mode 1 with mode 2; mode 3\n"),
+        (PAIRS, False, "\ncertified is a dwell time of 4 ms in each mode, each with its own"),
+        (
+            (),
+            False,
+            "no common quadratic Lyapunov function was found for the 4 modes above, though",
+        ),
+        ((), True, "certified is any switching between the modes, from sample to sample too"),
+    ],
+)
+def test_what_is_certified_is_told_with_every_pair_and_no_more_than_was_found(
+    breaking, any_switching, said
+):
+    modes = tuple(f"mode {k}" for k in range(4))
+    found = Certificate(modes, (), None, False, 0.0, breaking, 4e-3, any_switching)
+
+    assert said in certificate_text(found)
+
+
+def test_a_dwell_time_of_one_sample_is_any_switching():
+    """Loops that commute, seen without their common function."""
+    from unittest.mock import patch
+
+    calm, calmer = (0.5 * np.eye(2),), (0.4 * np.eye(2),)
+    with patch("controllers.certificate.common_function", return_value=None):
+        found = certificate({"calm": calm, "calmer": calmer}, DT)
+
+    assert found.dwell_s == pytest.approx(DT) and found.any_switching
+    assert not certificate(
+        dict(zip("ab", ((each,) for each in spirals()), strict=True)), DT
+    ).any_switching
 
 
 def test_the_arms_modes_are_certified_with_their_own_gains_behind_its_sensors():

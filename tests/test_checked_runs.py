@@ -90,6 +90,15 @@ def test_a_check_writes_its_tables_and_a_report_with_parameters_and_seeds(
         assert word in page
 
 
+def test_the_report_of_a_single_run_says_one_run(lq, monkeypatch, tmp_path):
+    monkeypatch.setattr(Loops, "once", drawable)
+    rig = tmp_path / "rig.toml"
+    rig.write_text('plant = "servo_drive"\n')
+    call("check", rig, lq, "--scenario", "step", "--figures", tmp_path / "out", "-q")
+
+    assert "1 run of lq.toml against" in (tmp_path / "out" / "report.html").read_text()
+
+
 def test_figures_close_the_first_and_the_worst_loops_again_and_no_others(lq, monkeypatch):
     again = []
 

@@ -87,18 +87,6 @@ def test_no_design_is_written_for_a_mode_that_its_command_cannot_steer(
     assert not written.exists()
 
 
-def test_a_plant_that_nothing_can_drive_is_refused_in_one_line(place, tmp_path):
-    """A supply at ambient pressure: no valve makes the slide move steadily."""
-    weak = tmp_path / "weak.toml"
-    weak.write_text('plant = "servo_drive"\n[values]\n"supply.pressure" = "1.013 bar"\n')
-    answer = call("design", weak, "--controller", "lq", "-o", tmp_path / "lq.toml", "-q")
-    (line,) = answer.stderr.splitlines()
-
-    assert answer.exit_code == 2
-    assert "servo_drive: no operating point at slide.position_m 0.04833, slide.velo" in line
-    assert "slide.velocity_m_s, chamber_a.pressure_pa and chamber_b.pressure_pa stand still" in line
-
-
 def test_a_design_for_another_plant_is_refused(place, monkeypatch):
     from studies import checking
 
@@ -122,7 +110,8 @@ def test_a_design_for_another_plant_is_refused(place, monkeypatch):
         ("horizon = 0", "spec.toml:2: mpc.horizon: is 0; expected a whole number from 1 to 500"),
         ("horizon = 2.5", "mpc.horizon: is 2.5; expected a whole number"),
         ("opening_v = nan", "mpc.opening_v: is nan; expected a number above 0"),
-        ("sample_time_s = -1", "mpc.sample_time_s: is -1; expected a number above 0"),
+        ("sample_time_s = -1", "mpc.sample_time_s: is -1; expected a number from 0.0001 to"),
+        ("sample_time_s = 50", "mpc.sample_time_s: is 50; expected a number from 0.0001 to 0.05"),
         ("[mpc.positioning]\nstribeck_share = 2", "expected a number from 0 to 1"),
         ("positon_m = 1", "did you mean 'position_m'?"),
         ("band_m = 1e-4", "did you mean 'positioning.band_m'?"),
@@ -150,6 +139,15 @@ def test_only_a_reference_that_ends_at_rest_has_a_goal_and_any_can_be_lost():
     assert [run["reached"] for run in document["runs"]] == [True, None]
     lines = table((GOOD, FAR, FOLLOWED)).splitlines()
     assert [line.split()[3] for line in lines] == ["reached", "yes", "no", "-"]
+
+
+def test_long_steps_of_a_controller_and_steps_that_never_settle_are_told_in_plain_numbers():
+    slow = replace(GOOD, settling_s=float("inf"), solve_median_s=38.43e-3, solve_p99_s=74e-3)
+    head, line = table([slow]).splitlines()
+
+    assert "ctrl ms" in head and "p99 ms" in head and "est ms" in head
+    assert line.split()[6] == "never" and line.split()[-3:-1] == ["38.43", "74"]
+    assert "e+" not in line and "inf" not in line
 
 
 def test_a_diverged_run_has_not_reached_anything():

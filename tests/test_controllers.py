@@ -130,7 +130,7 @@ def test_an_incomplete_design_file_is_an_error(tmp_path):
     path = tmp_path / "design.toml"
     path.write_text('controller = "lq"\n', encoding="utf-8")
 
-    with pytest.raises(ValueError, match=r"design\.toml has no plant"):
+    with pytest.raises(InputError, match=r"design\.toml: plant: is missing; expected a table"):
         read_design(path)
 
 

@@ -14,7 +14,7 @@ from studies.figures.fidelity import fidelity_figure
 from studies.figures.mode_count import mode_count_figure
 from studies.figures.panels import Line, Panel, panels_figure
 from studies.figures.robustness import influence_figure, spread_figure
-from studies.figures.style import save, styled
+from studies.figures.style import new_figure, save, styled
 from studies.robustness import Line as Asked
 from studies.robustness import Robustness
 from workbench.recording import Recording
@@ -94,3 +94,14 @@ def test_fonts_are_in_the_files_and_two_files_are_the_same(tmp_path):
     for ending in ("pdf", "svg", "csv", "txt"):
         one, two = (tmp_path / f"{name}.{ending}" for name in ("one", "two"))
         assert one.read_bytes() == two.read_bytes()
+
+
+def test_a_panel_has_one_line_in_the_table_where_its_label_has_two(tmp_path):
+    with styled():
+        figure = new_figure(3.5, 2.0)
+        axes = figure.subplots()
+        axes.plot([0, 1], [0, 1], label="line")
+        axes.set_ylabel("valve command\n(V)")
+    save(figure, tmp_path / "one", "x")
+
+    assert (tmp_path / "one.csv").read_text().splitlines()[1] == "valve command (V),line,0,0"

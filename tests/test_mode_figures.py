@@ -32,6 +32,17 @@ def test_the_map_shows_in_every_panel_what_is_active_there(hybrid):
             assert mode is hybrid.active(signals)
 
 
+def test_the_legend_of_the_map_says_what_its_colours_mean(hybrid):
+    figure = map_figure(sampled_hybrid(hybrid, STEP_S))
+    (legend,) = figure.legends
+    mesh = figure.axes[0].collections[0]
+    words = [text.get_text() for text in legend.get_texts()]
+
+    assert legend.get_title().get_text().startswith("active mode by colour and number")
+    for word, patch in zip(words, legend.get_patches(), strict=True):
+        assert patch.get_facecolor() == pytest.approx(mesh.to_rgba(int(word.split()[0])), abs=1e-6)
+
+
 def test_the_step_ends_where_it_should_and_names_the_modes_it_passes(hybrid):
     """The standard modes end 10 % of the way beyond the plant."""
     step = step_of({"modes": hybrid})

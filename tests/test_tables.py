@@ -2,8 +2,8 @@
 
 import csv
 
-from studies.tables import Table, noted_tables, write_tables
-from studies.text import columns
+from studies.tables import NEVER, Table, noted_tables, write_tables
+from studies.text import clock, columns
 
 HEAD = ("line", "asked & found", "share")
 ROWS = [("rise_time", "a, b", "5 %"), ("x^2", "$1 < 2", "12 %")]
@@ -41,3 +41,25 @@ def test_nothing_is_noted_outside_and_the_innermost_gets_it():
         columns(HEAD, ROWS)
 
     assert (len(outer), len(inner)) == (0, 1)
+
+
+def test_names_that_begin_with_a_digit_are_words_and_never_is_a_number():
+    text = columns(
+        ("mode", "settle ms", "place", "of"),
+        [
+            ("1 slide + 1 low", "145", "5.1 mm", "9 of 10"),
+            ("12 stick", NEVER, "-0.5 mm", "10 of 10"),
+        ],
+    )
+
+    assert text.splitlines() == [
+        "mode             settle ms    place        of",
+        "1 slide + 1 low        145   5.1 mm   9 of 10",
+        "12 stick             never  -0.5 mm  10 of 10",
+    ]
+
+
+def test_wall_times_are_in_the_unit_that_needs_no_exponent():
+    assert clock([65e-6, 160e-6]) == ("us", 1e6)
+    assert clock([65e-6, 38.43e-3]) == ("ms", 1e3)
+    assert clock([]) == ("us", 1e6)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import re
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -105,6 +106,19 @@ class RigText:
                 if re.search(rf"""["']{re.escape(item)}["']""", line):
                     return number
         return first
+
+    def placed(
+        self, error: InputError, place_of: Callable[[Message], tuple[str, ...]]
+    ) -> InputError:
+        """The error of what was built from this file, with the lines of what it is about.
+
+        What has no place in the file, by ``place_of``, is left as it is.
+        """
+        lines = [self.line(place_of(each)) for each in error.messages]
+        pairs = zip(error.messages, lines, strict=True)
+        return type(error)(
+            *(replace(each, file=self.file, line=line) if line else each for each, line in pairs)
+        )
 
     def finish(self) -> None:
         """Raise all complaints, sorted by line.

@@ -1,5 +1,7 @@
 """Commands on modes and controllers: modes, design."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
@@ -104,6 +106,7 @@ def design(
         from controllers.design_file import design as design_controller
         from controllers.design_file import gains, write_design
         from studies.design_text import design_texts
+        from studies.sample_times import require_multiple
         from studies.specification import design_numbers, read_specification
         from workbench.rig import load_rig
 
@@ -112,11 +115,15 @@ def design(
         asked = read_specification(spec, known) if spec else None
         numbers = design_numbers(asked, controller, known.plant) if asked else {}
         say(f"designing {controller}")
-        found = design_controller(controller, known.plant, numbers)
+        with _placed_in(spec):
+            found = design_controller(controller, known.plant, numbers)
+            time_s, name = found.controller.sample_time_s, f"{controller}.sample_time_s"
+            require_multiple(known.plant, time_s, name)
+        told = [*design_texts(found, say)]  # before the file: what cannot be told is not written
         write_design(found, output)
         for name, gain in gains(found.controller):
             typer.echo(f"{name}: {gain}")
-        for part in design_texts(found, say):
+        for part in told:
             typer.echo(part)
         typer.echo(f"wrote {output}")
         if asked and asked.asked:
@@ -125,3 +132,18 @@ def design(
             judged = check_rig(known, output, spec=asked, say=say).judged
             typer.echo("\n" + judged.text)
             tell_missed(judged)
+
+
+@contextmanager
+def _placed_in(spec: Path | None) -> Iterator[None]:
+    """Complaints of a design with their lines in the specification, where they are of it."""
+    from workbench.errors import InputError
+    from workbench.rig_text import RigText, read_text
+
+    try:
+        yield
+    except InputError as error:
+        if spec is None:
+            raise
+        text = RigText(read_text(spec)[0], str(spec), "a specification")
+        raise text.placed(error, lambda message: tuple(message.name.split("."))) from error

@@ -26,6 +26,8 @@ FINE = 0.02  # of the range: a narrower holding interval asks for a logarithmic 
 TEXT_WIDTH = 160  # letters that a line of the legend takes
 MAP_IN, LINE_IN = 2.7, 0.14  # height of the maps, and of a line of the legend
 
+MEANING = "active mode by colour and number; the shade itself has no order"
+
 Range = tuple[float, float]
 
 
@@ -39,29 +41,31 @@ def mode_map_figure(
     ``ranges`` names the two signals, across first; ``panels`` gives the values of the others by
     title, the design model's initial and nominal ones where it says nothing.
     """
-    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
 
     edges = {name: _edges(modes, name, ends) for name, ends in ranges.items()}
     drawn = {title: _active(modes, edges, values) for title, values in panels.items()}
     shown = sorted({k for active in drawn.values() for k in _large(active)})
     lines = [f"{k + 1}  {modes.hybrid.modes[k].name}" for k in shown]
-    columns = max(TEXT_WIDTH // (max(map(len, lines)) + 5), 1)
+    columns = max(TEXT_WIDTH // (max(map(len, lines)) + 8), 1)
+    shades = _shades(len(modes.hybrid.modes))
     with styled():
-        figure = new_figure(PAGE_IN, MAP_IN + LINE_IN * -(-len(lines) // columns))
+        figure = new_figure(PAGE_IN, MAP_IN + LINE_IN * (1 - (-len(lines) // columns)))
         axes = figure.subplots(1, len(panels), sharex=True, sharey=True, squeeze=False)[0]
         for panel, (title, active) in zip(axes, drawn.items(), strict=True):
-            _drawn(panel, edges, active, len(modes.hybrid.modes))
+            _drawn(panel, edges, active, shades)
             _numbered(panel, edges, active)
             panel.set_title(title)
             panel.set_xlabel(labelled(next(iter(ranges))))
         axes[0].set_ylabel(labelled([*ranges][1]))
         figure.legend(
-            [Line2D([], [], linestyle="none") for _ in lines],
+            [Patch(facecolor=shades[k], edgecolor="0.6", linewidth=0.4) for k in shown],
             lines,
+            title=MEANING,
             loc="outside lower center",
             ncols=columns,
-            handlelength=0.0,
-            handletextpad=0.0,
+            handlelength=1.2,
+            handletextpad=0.4,
         )
     return figure
 
@@ -99,16 +103,21 @@ def _near(modes: SampledHybrid, name: str) -> float:
     )
 
 
-def _drawn(
-    panel: Axes, edges: Mapping[str, np.ndarray], active: np.ndarray, number_of_modes: int
-) -> None:
+def _shades(number_of_modes: int) -> np.ndarray:
+    """A colour for each mode, shape (n, 4)."""
     from matplotlib import colormaps
+
+    return colormaps[COLOURS](TURN * np.arange(number_of_modes) % 1.0) * (1.0 - PALE) + PALE
+
+
+def _drawn(
+    panel: Axes, edges: Mapping[str, np.ndarray], active: np.ndarray, shades: np.ndarray
+) -> None:
     from matplotlib.colors import ListedColormap
 
-    shades = colormaps[COLOURS](TURN * np.arange(number_of_modes) % 1.0) * (1.0 - PALE) + PALE
     x, y = (display_scale(name).from_si(each) for name, each in edges.items())
     panel.pcolormesh(
-        x, y, active + 1, cmap=ListedColormap(shades), vmin=1, vmax=number_of_modes, rasterized=True
+        x, y, active + 1, cmap=ListedColormap(shades), vmin=1, vmax=len(shades), rasterized=True
     )
     panel.grid(False)
     for set_scale, each in ((panel.set_xscale, x), (panel.set_yscale, y)):

@@ -104,6 +104,7 @@ def _write_drawn(figure: Figure, path: Path) -> None:
         writer.writerow(("panel", "curve", "x", "y"))
         for number, axes in enumerate(figure.axes, start=1):
             panel = axes.get_title() or axes.get_ylabel() or axes.get_xlabel() or str(number)
+            panel = " ".join(panel.split())  # where a label breaks its line, a cell does not
             for curve, x, y in _curves(axes):
                 writer.writerows(
                     (panel, curve, _short(a), _short(b)) for a, b in zip(x, y, strict=True)

@@ -20,6 +20,7 @@ from studies.mode_pictures import figures_of_modes
 from studies.modes_text import modes_text
 from studies.page.drawn import drawings
 from studies.page.mode_cuts import cuts_of
+from studies.sample_times import require_multiple
 from studies.specification import design_numbers, read_specification
 from studies.text import number
 from workbench.errors import whole_file
@@ -120,9 +121,9 @@ def close_loops(
     numbers = design_numbers(asked, method, rig.plant) if asked else {}
     say(f"designing {method}")
     found = design(method, rig.plant, numbers)
-    path = Path(target)
+    require_multiple(rig.plant, found.controller.sample_time_s, f"{method}.sample_time_s")
+    told, path = tuple(design_texts(found, say)), Path(target)
     write_design(found, path)
-    told = tuple(design_texts(found, say))
     loops = loops_of(rig, {path: path.read_text(encoding="utf-8")}, estimators, scenarios)
     checked = recorded_runs(loops, runs, say)
     return Looped(target, told, checked, drawings(styled_figures(checked)))

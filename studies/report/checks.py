@@ -30,7 +30,8 @@ def report_check(found: CheckedRuns, noted: list[Table], folder: Path, command: 
     save_all(figures, folder, command)
     tables = write_tables(found.text, noted, folder / "tables")
     setup, made = found.setup, columns(("what", "version"), versions().items())
-    asked = f"{len(found.rows)} runs of {setup.path.name} against {setup.rig.name}."
+    runs = f"{len(found.rows)} runs" if found.several else "1 run"
+    asked = f"{runs} of {setup.path.name} against {setup.rig.name}."
     files = ", ".join(f"tables/{name}.csv and .tex" for name in tables)
     sections = [
         Section("What came out", (asked, f"Tables: {files}."), found.text, (*figures,)),

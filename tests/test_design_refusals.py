@@ -1,0 +1,83 @@
+"""`design` where a number or the supply leads nowhere: the cause by name, and no file."""
+
+import pytest
+from commands import call
+
+from linearize.standard import SLIDE_MODES, slide_modes
+from workbench.plants.servo_drive import servo_drive
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory):
+    path = tmp_path_factory.mktemp("rigs") / "rig.toml"
+    path.write_text('plant = "servo_drive"\n')
+    return path
+
+
+@pytest.mark.parametrize(
+    ("method", "numbers", "said"),
+    [
+        (
+            "lq",
+            "sample_time_s = 0.0015",
+            "spec.toml:2: lq.sample_time_s: is 0.0015; expected a multiple of the 0.001 s at which "
+            "servo_drive is simulated, as 0.001 or 0.002",
+        ),
+        (
+            "lq",
+            "position_m = 1e-30",
+            "spec.toml:2: lq.position_m: is 1e-30, farthest of all numbers from usual",
+        ),
+        ("lq", "position_m = 1e30\nsample_time_s = 0.05", "a number nearer to the usual 0.0015"),
+        ("mpc", "position_m = 1e30", "mpc.position_m: is 1e+30, farthest of all numbers"),
+    ],
+)
+def test_no_design_is_written_where_a_number_leads_nowhere(rig, tmp_path, method, numbers, said):
+    spec = tmp_path / "spec.toml"
+    spec.write_text(f"[{method}]\n{numbers}\n")
+    answer = call(
+        "design", rig, "--controller", method, "--spec", spec,
+        "-o", tmp_path / "design.toml", "-q",
+    )  # fmt: skip
+
+    assert answer.exit_code == 2
+    assert said in answer.stderr and len(answer.stderr.splitlines()) == 1
+    assert [p.name for p in tmp_path.iterdir()] == ["spec.toml"]
+
+
+def test_no_design_is_written_where_nothing_can_be_told_of_it(rig, tmp_path, monkeypatch):
+    def failing(found, say):
+        raise ValueError("Invalid inputs.")
+        yield
+
+    monkeypatch.setattr("studies.design_text.design_texts", failing)
+    answer = call("design", rig, "--controller", "lq", "-o", tmp_path / "lq.toml")
+
+    assert answer.exit_code == 2 and not [*tmp_path.iterdir()]
+
+
+@pytest.mark.parametrize(
+    ("plant", "enough"), [("servo_drive", "7"), ("crr_rig", "6.5"), ("gearbox", "9")]
+)
+@pytest.mark.parametrize("command", ["design", "modes"])
+def test_a_supply_that_moves_nothing_is_said_to_be_too_low(tmp_path, plant, command, enough):
+    """A supply little above ambient pressure: no valve makes anything move steadily."""
+    weak = tmp_path / "weak.toml"
+    weak.write_text(f'plant = "{plant}"\n[values]\n"supply.pressure" = "1.1 bar"\n')
+    method = {"gearbox": "hybrid-mpc", "crr_rig": "axis-lq"}.get(plant, "lq")
+    more = ["--controller", method, "-o", tmp_path / "lq.toml"] if command == "design" else []
+    answer = call(command, weak, *more, "-q")
+    (line,) = answer.stderr.splitlines()
+
+    assert answer.exit_code == 2
+    assert line.startswith("workbench: supply.pressure: 1.1 bar is too low to move: ")
+    assert line.endswith(f"; expected more, as {enough} bar")
+
+
+def test_a_point_that_is_missing_for_another_reason_is_not_blamed_on_the_supply(monkeypatch):
+    def stuck(plant):
+        raise ValueError("servo_drive: no operating point at all")
+
+    monkeypatch.setitem(SLIDE_MODES, "servo_drive", stuck)
+    with pytest.raises(ValueError, match=r"^servo_drive: no operating point at all$"):
+        slide_modes(servo_drive().with_values({"supply.pressure_pa": 1.1e5}))
