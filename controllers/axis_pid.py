@@ -72,7 +72,7 @@ def axis_pid(hybrid: HybridModel, spec: AxisPidSpec | None = None) -> TwoDegreeP
     Raises
     ------
     InputError
-        If a mode does not allow the bandwidth, with the nearest that it allows.
+        If a mode does not allow the bandwidth, with the nearest that all of them allow.
     """
     spec = spec or AxisPidSpec()
     ((_, wide),) = ranges_of(hybrid.plant)
