@@ -8,8 +8,8 @@ tied to K_p by the integral time these are two linear equations for K_p and K_d,
 where G is the sampled mode with its delays, I the summation and H the derivative filter as they are
 run.  Where they ask for a negative K_d the phase suffices without, and K_d is zero.  Where the loop
 is unstable or bears too little gain, no PID of that bandwidth is right, and the answer names the
-nearest that is right on all modes.  A lightly damped spring leaves a gap: below it the crossover is slow and needs no
-derivative, above it is fast and lives by it.
+nearest that is right on all modes.  A lightly damped spring leaves a gap: below it the crossover is
+slow and needs no derivative, above it is fast and lives by it.
 
 Source: K. J. Astrom and T. Hagglund, "Advanced PID Control", ISA 2006 (one point of the Nyquist
 curve); overshoot to phase margin by the second-order loop w^2 / (s (s + 2 z w)).
@@ -23,6 +23,7 @@ from math import atan, log, pi, radians, sqrt, tau
 import numpy as np
 
 from controllers.axis import axis_of
+from controllers.charging import charging_on
 from controllers.derivative import Derivative, LowPassDerivative
 from controllers.margins import Law, Margins, both_ways_s, closed, loop, margins_of
 from controllers.motion import MotionLimits, sliding_on
@@ -75,6 +76,7 @@ class PidParts:
     feedforward_share: float = 0.0
     turn_speed: float = 0.02
     turn_per_s: float = 5.0
+    standing_per_s: float = 5.0
     limits: MotionLimits = MotionLimits()
     dither: Dither = Dither()
     tracking_time_s: float = 0.05
@@ -124,9 +126,11 @@ def pid_with(
     centre_v = closed_command(hybrid.plant)
     ahead = Feedforward(
         sliding=scheduled(hybrid, lambda mode: sliding_on(mode, axis, centre_v)),
+        charging=scheduled(hybrid, lambda mode: charging_on(mode, axis, centre_v)),
         share=parts.feedforward_share,
         turn_speed=parts.turn_speed,
         turn_per_s=parts.turn_per_s,
+        standing_per_s=parts.standing_per_s,
         limits=parts.limits,
     )
     return TwoDegreePid(

@@ -40,6 +40,7 @@ NO_LAWS = (
 ALL_STATES = "all states are taken as known, no estimator is in the loop"
 MEASURED = "the law acts on the measurement itself and foresees nothing"
 FORESEEN = "foreseen by each mode as by the estimators of `check`"
+DRY = "margins of linear modes say nothing of dry friction: `workbench check` is what counts"
 MOST_PAIRS = 6  # that are named
 
 
@@ -76,6 +77,7 @@ def margins_text(found: Iterable[Margins], delays: Delays | None = None) -> str:
     found = [*found]
     lines = [columns(HEAD, [_row(each) for each in found])]
     lines += [] if delays is None else [_in_the_loop(delays)]
+    lines += [] if delays is None or delays.foreseen else [DRY]
     lines += [] if all(each.stable for each in found) else [UNSTABLE]
     return "\n".join(lines)
 
