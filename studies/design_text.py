@@ -39,7 +39,7 @@ NO_LAWS = (
 )
 ALL_STATES = "all states are taken as known, no estimator is in the loop"
 MEASURED = "the law acts on the measurement itself and foresees nothing"
-FORESEEN = "foreseen by each mode as by the estimators of `check`"
+FORESEEN = "foreseen by each mode as by the estimators of `check` (the certificate: exactly)"
 DRY = "margins of linear modes say nothing of dry friction: `workbench check` is what counts"
 MOST_PAIRS = 6  # that are named
 
