@@ -5,14 +5,67 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from controllers.derivative import Derivative, LowPassDerivative, SpanDerivative
-from controllers.pid_tuning import PidParts, TuningSpec, tuned_pid
+from controllers.pid_tuning import PidParts, TuningSpec, pid_with, tuned_pid
 from controllers.ranges import InRanges, ranges_of
+from controllers.scheduled import scheduled
 from controllers.spec import ranged
-from controllers.two_degree_pid import Dither, TwoDegreePid
+from controllers.two_degree_pid import Dither, PidGains, TwoDegreePid
 from linearize.modes import HybridModel
+from workbench.errors import InputError, Message
+
+USUAL_HZ, BANDWIDTHS_HZ = 0.7, {"crr_rig": 5.0}
+"""Bandwidths where none is asked for, by plant.
+
+The weakest mode of an arm allows no more, and on a drive a faster loop breaks away too far from
+stiction: it swings by millimetres about its target.  The light rod of the rig has a stiff and
+well damped spring, allows 6 Hz, and needs 5 Hz to hold its bench against dry friction.
+"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class OwnTuning(TuningSpec):
+    """As the tuning of a mode; a bandwidth of 0 is the usual one of the plant.
+
+    The integral is slow: what it gathers while an axis sticks throws the axis beyond its target.
+    """
+
+    bandwidth_hz: float = ranged(0.0)
+    integral_periods: float = 40.0
+
+    def on(self, plant: str) -> TuningSpec:
+        """With the bandwidth of a plant."""
+        hz = self.bandwidth_hz or BANDWIDTHS_HZ.get(plant, USUAL_HZ)
+        return replace(self, bandwidth_hz=hz)
+
+
+@dataclass(frozen=True, kw_only=True)
+class OwnGains:
+    """Gains of one's own for all modes, in V per unit of the position, per second and V s per unit.
+
+    Without ``proportional`` the modes are tuned.  Those under which papers 000 and 001 are
+    reproduced are 250, 200, 8 on the rig, and 4, 4, 0.4 on the arm.
+    """
+
+    proportional: float = ranged(0.0)
+    integral: float = ranged(0.0)
+    derivative: float = ranged(0.0)
+
+    @property
+    def given(self) -> bool:
+        """True where they take the place of the tuning.
+
+        Raises
+        ------
+        InputError
+            If there are others without the proportional one.
+        """
+        if not self.proportional and (self.integral or self.derivative):
+            what = "needs the proportional gain too"
+            raise InputError(Message(what, "axis-pid.gains", "proportional above 0, or no gains"))
+        return self.proportional > 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,7 +75,9 @@ class AxisPidSpec:
     Attributes
     ----------
     tuning
-        Bandwidth, margins and overshoot; by default a bandwidth that the weakest spring allows.
+        Bandwidth, margins and overshoot.
+    gains
+        Gains of one's own in place of the tuning.
     setpoint, setpoint_rate
         Shares of the reference in P and in D.
     feedforward_share
@@ -33,10 +88,13 @@ class AxisPidSpec:
         A sine on the opening; none by default.
     tracking_time_s
         Of back-calculation, where the valve is at its limit.
+    standing_per_s
+        In place of ``turn_per_s`` of the motion while the reference stands.
     """
 
     sample_time_s: float = 1e-3
-    tuning: TuningSpec = field(default_factory=lambda: TuningSpec(bandwidth_hz=0.7))
+    tuning: OwnTuning = field(default_factory=OwnTuning)
+    gains: OwnGains = field(default_factory=OwnGains)
     setpoint: float = ranged(1.0)
     setpoint_rate: float = ranged(1.0)
     feedforward_share: float = ranged(1.0)
@@ -45,6 +103,7 @@ class AxisPidSpec:
     dither: Dither = field(default_factory=Dither)
     tracking_time_s: float = 0.05
     smooth_v: float = 0.01
+    standing_per_s: float = ranged(20.0)
     motion: InRanges = field(default_factory=lambda: InRanges(turn_per_s=5.0))
 
     def parts(self, wide: float) -> PidParts:
@@ -58,6 +117,7 @@ class AxisPidSpec:
             feedforward_share=self.feedforward_share,
             turn_speed=self.motion.turn * wide,
             turn_per_s=self.motion.turn_per_s,
+            standing_per_s=self.standing_per_s,
             limits=self.motion.limits(wide),
             dither=self.dither,
             tracking_time_s=self.tracking_time_s,
@@ -67,13 +127,29 @@ class AxisPidSpec:
 
 
 def axis_pid(hybrid: HybridModel, spec: AxisPidSpec | None = None) -> TwoDegreePid:
-    """The PID of the plant's only axis.
+    """The PID of the plant's only axis, tuned or with gains of one's own.
 
     Raises
     ------
     InputError
-        If a mode does not allow the bandwidth, with the nearest that it allows.
+        If a mode does not allow the bandwidth, with the nearest that all of them allow; or if of
+        the gains the proportional one is missing.
     """
     spec = spec or AxisPidSpec()
     ((_, wide),) = ranges_of(hybrid.plant)
-    return tuned_pid(hybrid, spec.tuning, spec.parts(wide))
+    parts = spec.parts(wide)
+    if spec.gains.given:
+        own = _own(spec)
+        return pid_with(hybrid, scheduled(hybrid, lambda mode: own), parts)
+    return tuned_pid(hybrid, spec.tuning.on(hybrid.plant.name), parts)
+
+
+def _own(spec: AxisPidSpec) -> PidGains:
+    """The given gains with the shares of the reference."""
+    return PidGains(
+        proportional=spec.gains.proportional,
+        integral=spec.gains.integral,
+        derivative=spec.gains.derivative,
+        setpoint=spec.setpoint,
+        setpoint_rate=spec.setpoint_rate,
+    )

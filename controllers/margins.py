@@ -7,6 +7,7 @@ limits and without the rest of the positioning task.
 L(z) = -law(z) (z I - F)^-1 (G_0 z^-n + G_1 z^-(n+1)),   delay = n T + rest
 
 G_0 is what an opening does in the T - rest of a sample that is left when it arrives, G_1 the rest.
+A law that foresees the delay of the commands is one of :mod:`controllers.foresight`.
 
 Source: K. J. Astrom and B. Wittenmark, "Computer-Controlled Systems", 3rd ed., Ch. 2 (delay);
 P. Seiler, A. Packard and P. Gahinet, "An Introduction to Disk Margins", IEEE Control Systems
@@ -124,7 +125,7 @@ def closed(mode: Mode, law: Law, sample_time_s: float, delay_s: float = 0.0) -> 
 
 
 def unforeseen_s(plant: Plant) -> float:
-    """Delay of the sensors: that of the commands is foreseen by an estimator that looks ahead."""
+    """Delay of the sensors: no estimator that looks ahead foresees it."""
     return sum(float(e.delay_s) for e in plant.effects if isinstance(e, SensorDelay))
 
 

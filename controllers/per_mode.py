@@ -115,7 +115,8 @@ def _lq(mode: Mode, _area_m2: float, sample_time_s: float) -> Gain:
 
 
 def _pid(mode: Mode, _area_m2: float, sample_time_s: float) -> Gain:
-    found = pid_gain(mode, PidSpec())
+    # slower than a PID alone has it: here the integral runs from farther away
+    found = pid_gain(mode, PidSpec(sample_time_s=sample_time_s, integral_time_s=1.0))
     K = np.array([found.proportional, found.derivative, 0.0, 0.0, found.integral])
     return gain_of(*with_integral(mode, sample_time_s), K, sample_time_s)
 

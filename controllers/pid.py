@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from controllers.margins import Law
+from controllers.margins import Law, closed
 from controllers.motion import PREVIEW
 from controllers.positioning import (
     STATES,
@@ -21,11 +22,14 @@ from linearize.modes import HybridModel, Mode
 from linearize.standard import POSITION, VELOCITY
 from workbench.contracts import Command, Estimate
 
+HALVINGS = 12  # of a gain's interval: to a four thousandth
+DOUBLE = 1e-6  # what rounding makes of the double pole at 1 that a loop without K_p has
+
 CALM = PositioningSpec(
     approach_m=0.3,
     band_m=1e-4,
     leave_m=1.9e-4,
-    integrate_m=5e-4,
+    integrate_m=2e-4,
     stuck_factor=2.0,
     stribeck_share=0.0,
 )
@@ -41,18 +45,20 @@ class PidSpec:
     stiffening
         Square of the closed loop's fast frequency over that of the pneumatic spring, above 1.
     share_of_limit
-        Proportional gain over the one at which the loop begins to swing.
+        Proportional gain over the one at which the loop begins to swing, and the most that the
+        derivative one may have of its own such limit.
     integral_time_s
         K_p / K_i.
     filter_s
-        Time constant of the filter on the velocity.
+        Time constant of the filter on the velocity; none by default, since an estimate is smooth
+        already, and each millisecond of lag takes from a lightly damped spring.
     """
 
-    sample_time_s: float = 2e-3
+    sample_time_s: float = 1e-3
     stiffening: float = ranged(8.0, least=1.0, above=True)
-    share_of_limit: float = ranged(0.4, most=1.0, above=True)
-    integral_time_s: float = 1.0
-    filter_s: float = ranged(2e-3)
+    share_of_limit: float = ranged(0.45, most=1.0, above=True)
+    integral_time_s: float = 0.5
+    filter_s: float = ranged(0.0)
     positioning: PositioningSpec = field(default_factory=lambda: CALM)
 
 
@@ -131,18 +137,34 @@ def pid(hybrid: HybridModel, spec: PidSpec | None = None) -> Pid:
 def pid_gain(mode: Mode, spec: PidSpec) -> PidGain:
     """Gains from the mode taken as b / (s (s^2 + 2 z w s + w^2)) from opening to position.
 
-    With K_d the spring frequency rises to w sqrt(stiffening); the loop swings at
-    b K_p = 2 z w^3 stiffening (Routh), of which ``share_of_limit`` is taken.
+    With K_d the spring frequency rises to w sqrt(stiffening), as far as ``share_of_limit`` of the
+    largest K_d goes; K_p is that share of its own largest.  The limits are those of the loop as it
+    is run: Routh's, without sampling and filter, are several times as large, and swing.
     """
-    A, B = mode.A, mode.B
-    poles = np.linalg.eigvals(A)
-    pair = poles[np.argmax(poles.imag)]
+    pair = max(np.linalg.eigvals(mode.A), key=lambda pole: pole.imag)
     spring, damping = abs(pair) ** 2, -2.0 * pair.real
-    v = mode.state_names.index(VELOCITY)
-    b = float((A @ B)[v, 0])  # jerk per volt
-    kd = (spec.stiffening - 1.0) * spring / b
-    kp = spec.share_of_limit * damping * spring * spec.stiffening / b
-    feedback = np.zeros(len(A))
-    feedback[[mode.state_names.index(POSITION), v]] = kp, kd
-    closed = np.linalg.eigvals(A - B @ feedback[None, :])
-    return PidGain(kp, kp / spec.integral_time_s, kd, closed)
+    b = float((mode.A @ mode.B)[mode.state_names.index(VELOCITY), 0])  # jerk per volt
+    wanted, share = (spec.stiffening - 1.0) * spring / b, spec.share_of_limit
+    kd = min(wanted, share * _limit(lambda k: _growth(mode, 0.0, k, spec) < DOUBLE, wanted / share))
+    routh = damping * spring * spec.stiffening / b
+    kp = share * _limit(lambda k: _growth(mode, k, kd, spec) < 0.0, routh)
+    feedback = np.zeros(len(mode.A))
+    feedback[[mode.state_names.index(POSITION), mode.state_names.index(VELOCITY)]] = kp, kd
+    poles = np.linalg.eigvals(mode.A - mode.B @ feedback[None, :])
+    return PidGain(kp, kp / spec.integral_time_s, kd, poles)
+
+
+def _growth(mode: Mode, kp: float, kd: float, spec: PidSpec) -> float:
+    """What the loop as it is run grows by in a sample; negative where it is stable."""
+    gain = PidGain(kp, kp / spec.integral_time_s, kd, np.zeros(0))
+    law = gain.law(spec.sample_time_s, spec.filter_s)
+    return float(np.abs(np.linalg.eigvals(closed(mode, law, spec.sample_time_s))).max()) - 1.0
+
+
+def _limit(stable: Callable[[float], bool], most: float) -> float:
+    """The largest gain up to ``most`` that is stable, where all smaller ones are."""
+    least = 0.0 if not stable(most) else most
+    for _ in range(HALVINGS if least < most else 0):
+        middle = (least + most) / 2.0
+        least, most = (middle, most) if stable(middle) else (least, middle)
+    return least

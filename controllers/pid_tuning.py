@@ -8,8 +8,8 @@ tied to K_p by the integral time these are two linear equations for K_p and K_d,
 where G is the sampled mode with its delays, I the summation and H the derivative filter as they are
 run.  Where they ask for a negative K_d the phase suffices without, and K_d is zero.  Where the loop
 is unstable or bears too little gain, no PID of that bandwidth is right, and the answer names the
-nearest that is.  A lightly damped spring leaves a gap: below it the crossover is slow and needs no
-derivative, above it is fast and lives by it.
+nearest that is right on all modes.  A lightly damped spring leaves a gap: below it the crossover is
+slow and needs no derivative, above it is fast and lives by it.
 
 Source: K. J. Astrom and T. Hagglund, "Advanced PID Control", ISA 2006 (one point of the Nyquist
 curve); overshoot to phase margin by the second-order loop w^2 / (s (s + 2 z w)).
@@ -23,10 +23,11 @@ from math import atan, log, pi, radians, sqrt, tau
 import numpy as np
 
 from controllers.axis import axis_of
+from controllers.charging import charging_on
 from controllers.derivative import Derivative, LowPassDerivative
 from controllers.margins import Law, Margins, both_ways_s, closed, loop, margins_of
 from controllers.motion import MotionLimits, sliding_on
-from controllers.scheduled import Schedule, constant, scheduled
+from controllers.scheduled import Schedule, constant, driven_modes, scheduled
 from controllers.spec import ranged
 from controllers.through_valve import through_valve
 from controllers.two_degree_pid import Dither, Feedforward, PidGains, TwoDegreePid, law_of
@@ -75,6 +76,7 @@ class PidParts:
     feedforward_share: float = 0.0
     turn_speed: float = 0.02
     turn_per_s: float = 5.0
+    standing_per_s: float = 5.0
     limits: MotionLimits = MotionLimits()
     dither: Dither = Dither()
     tracking_time_s: float = 0.05
@@ -107,11 +109,12 @@ def tuned_pid(
     Raises
     ------
     InputError
-        If a mode does not allow the bandwidth, with the nearest that it allows.
+        If a mode does not allow the bandwidth, with the nearest that all of them allow.
     """
     spec, parts = spec or TuningSpec(), parts or PidParts()
     delay_s = both_ways_s(hybrid.plant)
-    gains = scheduled(hybrid, lambda mode: tuned_gains(mode, spec, parts, delay_s))
+    modes = tuple(mode for side in driven_modes(hybrid) for mode in side)
+    gains = scheduled(hybrid, lambda mode: tuned_gains(mode, spec, parts, delay_s, modes))
     return pid_with(hybrid, gains, parts)
 
 
@@ -123,9 +126,11 @@ def pid_with(
     centre_v = closed_command(hybrid.plant)
     ahead = Feedforward(
         sliding=scheduled(hybrid, lambda mode: sliding_on(mode, axis, centre_v)),
+        charging=scheduled(hybrid, lambda mode: charging_on(mode, axis, centre_v)),
         share=parts.feedforward_share,
         turn_speed=parts.turn_speed,
         turn_per_s=parts.turn_per_s,
+        standing_per_s=parts.standing_per_s,
         limits=parts.limits,
     )
     return TwoDegreePid(
@@ -140,25 +145,44 @@ def pid_with(
     )
 
 
-def tuned_gains(mode: Mode, spec: TuningSpec, parts: PidParts, delay_s: float) -> PidGains:
-    """The gains of one mode.
+def tuned_gains(
+    mode: Mode,
+    spec: TuningSpec,
+    parts: PidParts,
+    delay_s: float,
+    modes: tuple[Mode, ...] = (),
+) -> PidGains:
+    """The gains of one mode, which is among ``modes`` or alone.
 
     Raises
     ------
     InputError
-        If it does not allow the bandwidth.
+        If it does not allow the bandwidth, with the nearest that all of them allow.
     """
     found = _at_bandwidth(mode, spec, parts, delay_s, spec.bandwidth_hz)
     if found is not None:
         return found
-    tried = np.geomspace(LOWEST_HZ, HIGHEST_HZ, TRIED)
-    tried = tried[np.argsort(abs(np.log(tried / spec.bandwidth_hz)))]
-    reached = (hz for hz in tried if _at_bandwidth(mode, spec, parts, delay_s, hz) is not None)
-    nearest = next(reached, None)
+    together = (mode, *(other for other in modes if other is not mode))
+    nearest = _nearest_hz(together, spec, parts, delay_s)
     what = f"no PID crosses at {spec.bandwidth_hz:g} Hz with a phase margin of "
     what += f"{np.degrees(spec.margin_rad):.0f} deg and a gain margin of {spec.gain_margin:g}"
-    expected = "smaller margins" if nearest is None else f"for example {nearest:.2g} Hz"
+    expected = "smaller margins" if nearest is None else f"for example {nearest:g} Hz"
     raise InputError(Message(what, f"mode '{mode.name}'", expected))
+
+
+def _nearest_hz(
+    modes: tuple[Mode, ...], spec: TuningSpec, parts: PidParts, delay_s: float
+) -> float | None:
+    """The bandwidth next to the wanted one that all modes allow, as it is printed."""
+    tried = np.array([float(f"{hz:.2g}") for hz in np.geomspace(LOWEST_HZ, HIGHEST_HZ, TRIED)])
+    tried = tried[np.argsort(abs(np.log(tried / spec.bandwidth_hz)))]
+    return next((hz for hz in tried if _allowed(modes, spec, parts, delay_s, hz)), None)
+
+
+def _allowed(
+    modes: tuple[Mode, ...], spec: TuningSpec, parts: PidParts, delay_s: float, hz: float
+) -> bool:
+    return all(_at_bandwidth(mode, spec, parts, delay_s, hz) is not None for mode in modes)
 
 
 def pid_margins(mode: Mode, gains: PidGains, parts: PidParts, delay_s: float) -> Margins:

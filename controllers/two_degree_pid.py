@@ -7,9 +7,9 @@ The integral is kept in volts.  Where the gains change with the mode, it takes o
 lose or gain by that, so that the opening does not jump (bumpless transfer).  Where the valve is at
 its limit, it follows what was sent (back-calculation).
 
-The opening of the wanted motion comes from the modes: its part at zero speed is what dry friction
-and gravity need in that direction (friction compensation), the rest is feedforward of speed,
-acceleration and jerk.  The dead zone is undone in the command.
+The opening of the wanted motion comes from the modes and builds the pressures that belong to it:
+those against dry friction and gravity in that direction (friction compensation), and those of speed
+and acceleration, see :mod:`controllers.charging`.  The dead zone is undone in the command.
 
 Source: K. J. Astrom and T. Hagglund, "Advanced PID Control", ISA 2006.
 """
@@ -22,6 +22,7 @@ from math import sin, tau
 
 import numpy as np
 
+from controllers.charging import Charging, charging_mixed
 from controllers.derivative import Derivative, Filter, LowPassDerivative, settled
 from controllers.margins import Law
 from controllers.motion import PREVIEW, MotionLimits, Sliding, motion
@@ -66,28 +67,36 @@ class Feedforward:
         Of that opening.
     turn_speed
         Speed, in units of the position per second, within which the directions are mixed.
-    turn_per_s
-        An error counts as so much speed in its direction: at rest friction is compensated towards
-        the target.
+    turn_per_s, standing_per_s
+        An error counts as so much speed in its direction, the latter while the reference stands: at
+        rest friction is compensated towards the target.  More of it is a stiffer spring, which on
+        the move turns with the noise of a measurement.
     limits
         Beyond which the reference has jumped.
     """
 
     sliding: Schedule[Sliding]
+    charging: Schedule[Charging]
     share: float = 0.0
     turn_speed: float = 0.02
     turn_per_s: float = 5.0
+    standing_per_s: float = 5.0
     limits: MotionLimits = MotionLimits()
 
 
 @dataclass(frozen=True)
 class PidMemory:
-    """Integral in volts, the derivative's memory, the gains of last time, and samples so far."""
+    """What a sample leaves for the next.
+
+    The integral is in V, ``slopes`` is of the derivative, gains are those of last time, and
+    pressures those of the wanted motion, None before the first sample that asks for any.
+    """
 
     integral_v: float
     slopes: np.ndarray
     gains: PidGains
     samples: int
+    pressures: np.ndarray | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,22 +139,39 @@ class TwoDegreePid:
         taken_over = proportional_and_rate(memory.gains) - direct if now.integral else 0.0
         integral = memory.integral_v + taken_over
         integral += dt * now.integral * float(reference[0, 0] - y)
-        wanted = direct + integral + self._ahead_v(float(y), ahead, moving)
+        sent_ahead, pressures = self._ahead_v(float(reference[0, 0]), ahead, moving, memory)
+        wanted = direct + integral + sent_ahead
         opening = float(np.clip(wanted, *self.valve.openings_v))
         integral += dt / self.tracking_time_s * (opening - wanted)
         sent = self.valve.sent(opening + self.dither.at(memory.samples * dt), estimate)
-        kept = PidMemory(integral, A @ memory.slopes + B * y, now, memory.samples + 1)
+        kept = PidMemory(integral, A @ memory.slopes + B * y, now, memory.samples + 1, pressures)
         return Command(sent, kept, {"opening_v": opening, "integral_v": integral})
 
     def _ahead(self, speed: float, error: float) -> float:
-        wish = (speed + self.feedforward.turn_per_s * error) / self.feedforward.turn_speed
+        given = self.feedforward
+        per_s = given.turn_per_s if speed else given.standing_per_s
+        wish = (speed + per_s * error) / given.turn_speed
         return 0.5 + 0.5 * float(np.tanh(wish))
 
-    def _ahead_v(self, place: float, ahead: float, moving: np.ndarray) -> float:
-        if not self.feedforward.share:
-            return 0.0
-        here = self.feedforward.sliding.weighted(place, ahead)
-        return self.feedforward.share * float(sum(w * each.at(moving)[2] for w, each in here))
+    def _ahead_v(
+        self, place: float, ahead: float, moving: np.ndarray, memory: PidMemory
+    ) -> tuple[float, np.ndarray | None]:
+        """The share of the wanted motion's opening, and its pressures a sample later.
+
+        At the wanted place: at the measured one it would push away from it what gravity pulls to.
+        """
+        share, dt = self.feedforward.share, self.sample_time_s
+        if not share:
+            return 0.0, None
+        pressures = memory.pressures
+        if pressures is None:
+            begun = self.feedforward.sliding.weighted(place, ahead)
+            pressures = sum(w * each.level[:2] for w, each in begun)
+        mode = charging_mixed(self.feedforward.charging.weighted(place, ahead))
+        coming = moving[:2] + dt * moving[1:]
+        wanted = mode.opening(pressures, moving[0], coming, dt)
+        opening = float(np.clip(wanted, *self.valve.openings_v))
+        return share * opening, mode.after(pressures, moving[0], opening, dt)
 
     @cached_property
     def _filter(self) -> Filter:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from math import degrees, isinf
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from studies.instability_text import UNSTABLE, unstable_text
 from studies.text import columns, number
@@ -12,6 +12,7 @@ from studies.text import columns, number
 if TYPE_CHECKING:
     from controllers.certificate import Certificate
     from controllers.design_file import Design
+    from controllers.foresight import Delays
     from controllers.hybrid_mpc import HybridMpc
     from controllers.margins import Margins
 
@@ -33,14 +34,15 @@ NO_LAWS = (
     "no margins: the law is the plant's own model, not one linear law per mode; `workbench check` "
     "says what the whole plant makes of it"
 )
+ALL_STATES = "all states are taken as known, no estimator is in the loop"
+MEASURED = "the law acts on the measurement itself and foresees nothing"
+FORESEEN = "foreseen by each mode as by the estimators of `check` (the certificate: exactly)"
+DRY = "margins of linear modes say nothing of dry friction: `workbench check` is what counts"
 
 
 def design_texts(found: Design, say: Callable[[str], None]) -> Iterator[str]:
     """What is known of a design: margins of each mode, and what is certified across them."""
-    from controllers.certificate import certificate
-    from controllers.margins import loops, margins, unforeseen_s
-
-    made, delay_s = found.controller, unforeseen_s(found.plant)
+    made = found.controller
     if found.method == "hybrid-mpc":
         yield search_text(made)
         return
@@ -48,24 +50,48 @@ def design_texts(found: Design, say: Callable[[str], None]) -> Iterator[str]:
         yield NO_LAWS
         return
     for part in getattr(made, "regulators", (made,)):
-        axis = getattr(part, "axis", None)
-        loop = (found.hybrid, part.laws, made.sample_time_s, delay_s, axis)
-        closed = loops(*loop)
-        yield margins_text(margins(*loop), delay_s, unstable_text(closed, made.sample_time_s))
-        say("looking for a certificate across modes")
-        yield certificate_text(certificate(closed, made.sample_time_s))
+        yield from _part_texts(found, part, say)
 
 
-def margins_text(found: Iterable[Margins], delay_s: float = 0.0, unstable: str = UNSTABLE) -> str:
-    """One line per mode, a dash where the loop has no such margin, and what delay is in them.
+def _part_texts(found: Design, part: Any, say: Callable[[str], None]) -> Iterator[str]:
+    """Of the laws of one axis; the certificate takes what is foreseen as foreseen exactly."""
+    from controllers.certificate import certificate
+    from controllers.foresight import delays_of, foreseeing
+    from controllers.margins import loops, margins
+
+    hybrid, sample_time_s = found.hybrid, found.controller.sample_time_s
+    axis, delays, laws = getattr(part, "axis", None), delays_of(found.plant, part), part.laws
+    ahead = foreseeing(hybrid, laws, sample_time_s, axis) if delays.foreseen else laws
+    whole = (hybrid, ahead, sample_time_s, delays.both_s, axis)
+    unstable = unstable_text(loops(*whole), sample_time_s)
+    yield margins_text(margins(*whole), delays, unstable)
+    say("looking for a certificate across modes")
+    closed = loops(hybrid, laws, sample_time_s, delays.left_s, axis)
+    yield certificate_text(certificate(closed, sample_time_s))
+
+
+def margins_text(
+    found: Iterable[Margins], delays: Delays | None = None, unstable: str = UNSTABLE
+) -> str:
+    """One line per mode, a dash where the loop has no such margin, and what is in the loop.
 
     ``unstable`` says what an unstable loop does, and is told where there is one.
     """
     found = [*found]
     lines = [columns(HEAD, [_row(each) for each in found])]
-    lines += [f"with {1e3 * delay_s:g} ms of the sensors in the loop"] if delay_s else []
+    lines += [] if delays is None else [_in_the_loop(delays)]
+    lines += [] if delays is None or delays.foreseen else [DRY]
     lines += [] if all(each.stable for each in found) else [unstable]
     return "\n".join(lines)
+
+
+def _in_the_loop(delays: Delays) -> str:
+    """Which delays the margins are for, and what the law is taken to know."""
+    commands = f"commands, {FORESEEN}" if delays.foreseen else "commands"
+    sizes = {"sensors": delays.sensors_s, commands: delays.commands_s}
+    late = [f"{1e3 * size:g} ms of the {whose}" for whose, size in sizes.items() if size]
+    knows = ALL_STATES if delays.foreseen else MEASURED
+    return f"with {' and '.join(late)}; {knows}" if late else f"without delays; {knows}"
 
 
 def certificate_text(found: Certificate) -> str:

@@ -150,14 +150,16 @@ def test_gain_margins_are_where_the_loop_changes_its_stability(controllers, hybr
 
 
 def test_lq_and_mpc_bear_half_the_gain_and_more_and_30_degrees(controllers, hybrid):
-    """PID does not: its fast pair grows with 7.6 1/s in the middle, and leans on dry friction."""
+    """PID does not: without the pressures it leaves the spring at 5 deg, but it is stable."""
     for name in ("lq", "mpc"):
         for found in margins(hybrid, controllers[name].laws, DT):
             assert found.stable
             assert found.gain[0] < 0.5 and found.gain[1] > 2.0
             assert found.phase_rad > pi / 6.0 and found.delay_s > DT
             assert found.distance > 0.5
-    assert not any(found.stable for found in margins(hybrid, controllers["pid"].laws, DT))
+    pid = controllers["pid"]
+    for found in margins(hybrid, pid.laws, pid.sample_time_s):
+        assert found.stable and found.gain[1] > 1.9 and found.phase_rad > pi / 60.0
 
 
 def test_the_loop_of_a_mode_is_the_sampled_mode_behind_its_law(hybrid):
@@ -184,4 +186,4 @@ def test_design_prints_margins_of_every_mode_and_what_is_certified_across_them(t
     assert len({line.split("  ")[0] for line in lines[head + 1 : head + 7]}) == 6
     certified = "one quadratic Lyapunov function" in answer.stdout
     assert certified == (name != "pid")
-    assert certified != ("no certificate across modes: unstable" in answer.stdout)
+    assert "unstable" not in answer.stdout

@@ -134,7 +134,9 @@ def test_the_dead_zone_is_jumped_and_dither_goes_around_the_opening(drive):
 def test_friction_is_compensated_towards_the_target(drive):
     """At rest the opening of the wanted direction is sent before there is any integral."""
     none = PidGains(proportional=0.0, integral=0.0, derivative=0.0)
-    pid = pid_with(drive, none, PidParts(feedforward_share=1.0, turn_per_s=50.0))
+    pid = pid_with(
+        drive, none, PidParts(feedforward_share=1.0, turn_per_s=50.0, standing_per_s=50.0)
+    )
     ahead, _ = steps(pid, 0.150, [0.145])
     back, _ = steps(pid, 0.140, [0.145])
     wanted = pid.feedforward.sliding.forward[1].level[2]
@@ -247,7 +249,7 @@ def test_a_tuned_pid_with_feedforward_holds_a_sine_on_the_rig_that_the_papers_pi
 def test_a_tuned_pid_with_feedforward_brings_the_drive_near_its_place_without_a_swing(drive):
     """Position alone, stiction and dead zone: it sticks 1.7 mm away (measured), and stays calm."""
     plant = servo_drive().lean()
-    parts = PidParts(feedforward_share=1.0, setpoint_rate=1.0, turn_per_s=50.0)
+    parts = PidParts(feedforward_share=1.0, setpoint_rate=1.0, turn_per_s=50.0, standing_per_s=50.0)
     pid = tuned_pid(drive, TuningSpec(bandwidth_hz=6.5, gain_margin=1.5), parts)
     t = np.clip((DT * np.arange(1500) - 0.1) / 0.5, 0.0, 1.0)
     reference = 0.115 + 0.06 * t**3 * (10.0 - 15.0 * t + 6.0 * t**2)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from controllers.margins import Margins, margins_of, unforeseen_s
+from controllers.foresight import foreseeing
+from controllers.margins import Margins, both_ways_s, margins_of
 from controllers.per_mode import Method, PerModeSpec, per_mode
 from controllers.scheduled import driven_modes
 from estimators import ESTIMATORS
@@ -54,12 +55,12 @@ def usual_spec(plant: Plant) -> str:
 def mode_offers(rig: Rig, say: Say) -> Offers:
     """The margins of every method in every driven mode."""
     hybrid = slide_modes(rig.plant)
-    sides, delay_s = driven_modes(hybrid), unforeseen_s(rig.plant)
+    sides, delay_s = driven_modes(hybrid), both_ways_s(rig.plant)
     found: dict[str, dict[Method, Margins]] = {m.name: {} for side in sides for m in side}
     for method in Method:
         say(f"margins of {method.value} in {len(found)} modes")
         spec = PerModeSpec(modes=dict.fromkeys(found, method))
-        laws = per_mode(hybrid, spec).laws
+        laws = foreseeing(hybrid, per_mode(hybrid, spec).laws, spec.sample_time_s)
         for modes, side in zip(sides, (laws.forward, laws.backward), strict=True):
             for mode, law in zip(modes, side, strict=True):
                 found[mode.name][method] = margins_of(mode, law, spec.sample_time_s, delay_s)

@@ -1,0 +1,96 @@
+"""Laws behind an estimator that hands on the state which their opening will meet.
+
+The estimators of a plant with delayed commands carry their state on by what was sent and is under
+way (:mod:`estimators.ahead`), in whole samples.  On a mode that prediction is linear,
+
+    x_ahead = F^m x + sum over k = 1 .. m of F^(m-k) G u(k - delay / T),   m = delay / T rounded
+
+u counted in samples after the newest, between samples by interpolation.  So it is part of the law,
+whose memory the sent openings are; the delay itself is in the loop as any other.
+
+Source: O. J. M. Smith, "Closer control of loops with dead time", Chem. Eng. Progress 53 (1957) 217,
+in its state-space form.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import ceil
+
+import numpy as np
+
+from controllers.axis import Axis
+from controllers.margins import Law, both_ways_s, unforeseen_s
+from controllers.scheduled import Schedule, driven_modes
+from linearize.discrete import sampled
+from linearize.modes import HybridModel, Mode
+from workbench.contracts import Controller
+from workbench.effects.valve_command import command_delay_s
+from workbench.plant import Plant
+
+
+@dataclass(frozen=True)
+class Delays:
+    """What is late in a loop: sensors, commands, and whether an estimator foresees the latter."""
+
+    sensors_s: float
+    commands_s: float
+    foreseen: bool
+
+    @property
+    def both_s(self) -> float:
+        """What is in the loop."""
+        return self.sensors_s + self.commands_s
+
+    @property
+    def left_s(self) -> float:
+        """What an exact foresight leaves of it."""
+        return self.sensors_s if self.foreseen else self.both_s
+
+
+def delays_of(plant: Plant, law: Controller) -> Delays:
+    """Those that a law meets: on the raw measurement, as one with a ``signal`` is, all of both."""
+    sensors_s = unforeseen_s(plant)
+    return Delays(sensors_s, both_ways_s(plant) - sensors_s, not hasattr(law, "signal"))
+
+
+def foreseeing(
+    hybrid: HybridModel, laws: Schedule[Law], sample_time_s: float, axis: Axis | None = None
+) -> Schedule[Law]:
+    """The laws of all driven modes, each behind the foresight of its mode."""
+    delay_s = command_delay_s(hybrid.plant.effects)
+    pairs = zip(driven_modes(hybrid, axis), (laws.forward, laws.backward), strict=True)
+    sides = (
+        tuple(
+            foresighted(mode, law, sample_time_s, delay_s)
+            for mode, law in zip(modes, side, strict=True)
+        )
+        for modes, side in pairs
+    )
+    return Schedule(laws.positions_m, *sides)
+
+
+def foresighted(mode: Mode, law: Law, sample_time_s: float, delay_s: float) -> Law:
+    """One law on the predicted state; its memory ends with the sent openings, oldest first."""
+    reach, effects = _ahead(mode, sample_time_s, delay_s)
+    m, kept = len(law.A), effects.shape[1]
+    if not kept:
+        return law
+    A = np.zeros((m + kept,) * 2)
+    A[:m, :m], A[:m, m:] = law.A, law.B @ effects
+    A[m:, m:] = np.eye(kept, k=1)
+    C, D = np.concatenate([law.C, law.D @ effects]), law.D @ reach
+    A[-1] = C
+    return Law(A, np.vstack([law.B @ reach, np.zeros((kept - 1, len(D))), D]), C, D)
+
+
+def _ahead(mode: Mode, sample_time_s: float, delay_s: float) -> tuple[np.ndarray, np.ndarray]:
+    """What state and sent openings, oldest first, do to the predicted state: (n, n), (n, kept)."""
+    late, small = delay_s / sample_time_s, sampled(mode, sample_time_s)
+    kept = ceil(late - 1e-9) if round(late) else 0
+    index, reach = np.arange(kept) - (kept - 1), np.eye(len(small.F))
+    effects = np.zeros((len(small.F), kept))
+    for k in range(1, round(late) + 1):
+        sent = [np.interp(k - late, index, one) for one in np.eye(kept)]
+        reach, effects = small.F @ reach, small.F @ effects + np.outer(small.G[:, 0], sent)
+    return reach, effects

@@ -1,0 +1,98 @@
+"""Delays in the margins: a law behind an estimator that looks ahead, and one that does not."""
+
+import numpy as np
+import pytest
+from commands import call
+
+from controllers.design_file import design
+from controllers.foresight import delays_of, foresighted
+from controllers.margins import both_ways_s, closed, margins, margins_of
+from controllers.scheduled import driven_modes
+from studies.design_text import design_texts
+from studies.text import number
+from workbench.plants.crr_rig import crr_rig
+from workbench.plants.servo_drive import servo_drive
+
+DT = 2e-3
+NEAR = (2e-3, 4e-3)  # about the margin of delay
+
+
+@pytest.fixture(scope="module")
+def lq():
+    return design("lq", servo_drive())
+
+
+@pytest.fixture(scope="module")
+def mode(lq):
+    return driven_modes(lq.hybrid)[0][1]
+
+
+@pytest.fixture(scope="module")
+def law(lq):
+    return lq.controller.laws.forward[1]
+
+
+def test_a_foreseen_delay_leaves_the_poles_of_the_loop_as_they_were(mode, law):
+    """With the mode's own prediction the loop is the undelayed one, its openings under way at 0."""
+    ahead = foresighted(mode, law, DT, 6.0 * DT)
+    alone, there = (
+        np.sort(abs(np.linalg.eigvals(closed(mode, *each))))
+        for each in ((law, DT), (ahead, DT, 6.0 * DT))
+    )
+
+    assert there[-5:] == pytest.approx(alone, rel=1e-6)
+    assert there[:-5].max() < 0.1
+
+
+def test_a_foreseen_delay_takes_margins_although_it_leaves_the_poles(mode, law):
+    """20 ms: the plant with 24 ms swings by 4 mm, where 6 to 7 ms of margin had been printed."""
+    alone, ahead = margins_of(mode, law, DT), foresighted(mode, law, DT, 20e-3)
+    found = margins_of(mode, ahead, DT, 20e-3)
+    wrong_s = [np.abs(np.linalg.eigvals(closed(mode, ahead, DT, 20e-3 + d))).max() for d in NEAR]
+
+    assert alone.delay_s > 6e-3
+    assert 2e-3 < found.delay_s < 4e-3
+    assert [radius < 1.0 for radius in wrong_s] == [d < found.delay_s for d in NEAR]
+
+
+def test_less_than_half_a_sample_is_not_foreseen_as_the_estimators_do_not(mode, law):
+    assert foresighted(mode, law, DT, 0.4 * DT) is law
+
+
+@pytest.mark.parametrize(
+    ("rig", "method", "words"),
+    [
+        (
+            'plant = "servo_drive"\n[effects]\nadd = ["command_delay"]\n'
+            '[values]\n"command_delay.delay" = "20 ms"\n',
+            "lq",
+            "with 20 ms of the commands, foreseen by each mode",
+        ),
+        (
+            'plant = "crr_rig"\n',
+            "axis-pid",
+            "with 1 ms of the sensors and 1 ms of the commands; the law acts on",
+        ),
+        ('plant = "servo_drive"\n', "lq", "without delays; all states are taken as known"),
+    ],
+)
+def test_design_says_which_delays_its_margins_are_for(tmp_path, rig, method, words):
+    path = tmp_path / "rig.toml"
+    path.write_text(rig)
+    answer = call("design", path, "--controller", method, "-o", tmp_path / "design.toml", "-q")
+
+    assert answer.exit_code == 0, answer.output
+    assert words in answer.stdout
+
+
+def test_a_law_on_the_measurement_has_the_margins_that_it_was_tuned_for():
+    """With the delay of one way more than the sensors' alone, which had been printed."""
+    found = design("axis-pid", crr_rig(), {"tuning": {"bandwidth_hz": 5.0}})
+    delays = delays_of(found.plant, found.controller)
+    hybrid, laws, dt = found.hybrid, found.controller.laws, found.controller.sample_time_s
+    printed = "\n".join(design_texts(found, lambda said: None))
+    tuned = margins(hybrid, laws, dt, both_ways_s(found.plant))
+
+    assert (delays.both_s, delays.foreseen) == (pytest.approx(2e-3), False)
+    for each in tuned:
+        assert f"{number(np.degrees(each.phase_rad), 3)}" in printed
