@@ -1,0 +1,46 @@
+"""Modes at supplies that differ from a plant's own: operating points are found at each of them."""
+
+import numpy as np
+import pytest
+
+from linearize.equilibrium import operating_point
+from linearize.reduction import design_model
+from workbench.plants import PLANTS
+
+BAR = 1e5
+SLIDING = {
+    "crr_rig": ("rod", ("cap.pressure_pa", "rod_side.pressure_pa")),
+    "servo_drive": ("slide", ("chamber_a.pressure_pa", "chamber_b.pressure_pa")),
+}
+
+
+@pytest.mark.parametrize("supply_bar", [3.0, 5.0, 7.0, 10.0])
+@pytest.mark.parametrize("speed_m_s", [-0.1, 0.0, 0.1])
+@pytest.mark.parametrize("plant_name", SLIDING)
+def test_a_steady_slide_is_found_at_any_usual_supply(plant_name, speed_m_s, supply_bar):
+    """On the rig only its own 6.5 bar had been: elsewhere Newton ran into a spool that is shut."""
+    body, pressures = SLIDING[plant_name]
+    plant = PLANTS[plant_name]().with_values({"supply.pressure_pa": supply_bar * BAR})
+    model = design_model(plant)
+    free = ("valve.command_v", *pressures)
+    vanish = (f"{body}.velocity_m_s", *pressures)
+
+    found = operating_point(model, {f"{body}.velocity_m_s": speed_m_s}, free, vanish)
+
+    rates = dict(zip(model.states, found.rates / model.scale, strict=True))
+    assert max(abs(rates[name]) for name in vanish) < 1e-6
+    state = dict(zip(model.states, found.state, strict=True))
+    low, high = plant.values["atmosphere.pressure_pa"], supply_bar * BAR
+    assert all(low <= state[name] <= high for name in pressures)
+    signal = plant.commands[0]
+    assert signal.lower <= found.command[0] <= signal.upper
+    assert np.sign(found.command[0] - signal.nominal) == np.sign(speed_m_s) or speed_m_s == 0.0
+
+
+def test_a_speed_that_no_supply_gives_has_no_operating_point():
+    body, pressures = SLIDING["crr_rig"]
+    model = design_model(PLANTS["crr_rig"]())
+    free, vanish = ("valve.command_v", *pressures), (f"{body}.velocity_m_s", *pressures)
+
+    with pytest.raises(ValueError, match=r"no operating point at rod\.velocity_m_s 50"):
+        operating_point(model, {f"{body}.velocity_m_s": 50.0}, free, vanish)
