@@ -44,7 +44,9 @@ def test_what_fails_in_the_windows_is_not_taken_for_a_short_recording(monkeypatc
     recording = Recording("fill", 2.5e-3, channels)
     plant = joint.fit_for(recording)
     monkeypatch.setattr(
-        horizons, "_filtered", lambda *_: SimpleNamespace(states=None, measured=(), innovations=())
+        horizons,
+        "filter_pass",
+        lambda *_: SimpleNamespace(states=None, measured=(), innovations=(), normalised=()),
     )
     monkeypatch.setattr(horizons, "_one_step", lambda *_: {PRESSURE: np.zeros(n)})
     monkeypatch.setattr(horizons, "_free_run", lambda *_: dict.fromkeys(plant.model.states))
