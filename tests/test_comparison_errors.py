@@ -43,11 +43,8 @@ def test_what_fails_in_the_windows_is_not_taken_for_a_short_recording(monkeypatc
     channels = {"valve.pwm": np.full(n, 0.5), "bellows.pressure_pa": np.linspace(1.2e5, 1.3e5, n)}
     recording = Recording("fill", 2.5e-3, channels)
     plant = joint.fit_for(recording)
-    monkeypatch.setattr(
-        horizons,
-        "filter_pass",
-        lambda *_: SimpleNamespace(states=None, measured=(), innovations=(), normalised=()),
-    )
+    nothing = SimpleNamespace(states=None)
+    monkeypatch.setattr(horizons, "_followed", lambda *_: (nothing, []))
     monkeypatch.setattr(horizons, "_one_step", lambda *_: {PRESSURE: np.zeros(n)})
     monkeypatch.setattr(horizons, "_free_run", lambda *_: dict.fromkeys(plant.model.states))
     monkeypatch.setattr(horizons, "_windows", broken)
