@@ -117,8 +117,20 @@ class _Search:
                 break
             move = -np.linalg.lstsq(self.slope(values), left, rcond=None)[0]
             move = np.clip(move, -1.0, 1.0) * self.size
-            values, left = _shortened(values, self.columns, move, left, self.residual, self.rows)
+            values, left = self._shortened(values, move, left)
         return values, left
+
+    def _shortened(
+        self, values: np.ndarray, move: np.ndarray, left: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The first of ever shorter moves that brings the rates down, else the shortest."""
+        for share in 0.5 ** np.arange(12):
+            trial = values.copy()
+            trial[self.columns] += share * move
+            found = self.residual(trial)[self.rows]
+            if np.linalg.norm(found) < np.linalg.norm(left):
+                break
+        return trial, found
 
     def elsewhere(
         self, values: np.ndarray, left: np.ndarray, names: tuple[str, ...]
@@ -152,17 +164,6 @@ class _Search:
             if self.solved(left):
                 break
         return values, left
-
-
-def _shortened(values, columns, move, left, residual, rows):
-    """The first of ever shorter moves that brings the residual down."""
-    for share in 0.5 ** np.arange(12):
-        trial = values.copy()
-        trial[columns] += share * move
-        found = residual(trial)[rows]
-        if np.linalg.norm(found) < np.linalg.norm(left):
-            break
-    return trial, found
 
 
 def _ends(model: DesignModel, name: str, value: float) -> tuple[float, float]:

@@ -10,7 +10,7 @@ Source: diagnosis.md 1.9 and 1.10 (forward selection with a new scan after each 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from math import inf
 
@@ -162,8 +162,7 @@ def _improvement(
         final = fitted_rig(assembled(done.rig, done.kept.steps), fit)
     if final is not done.rig:
         added = unknown_forms(done.rig, (step.candidate for step in done.steps))
-        moved = moved_parameters(fit, added)
-        parameters = tuple(r if r.name in added else _counted_from(done.rig, r) for r in moved)
+        parameters = tuple(_counted_from(done.rig, added, row) for row in moved_parameters(fit))
     sets, windows = {"train": train, "validation": validation}, fit.windows
     noise = dict(zip(windows.plant.measured, windows.noise.tolist(), strict=True))
     free: tuple[Errors, Errors] = {}, {}
@@ -208,8 +207,13 @@ def _last_fit(done: Rounds, kept: Kept) -> tuple[Fit, Fit | None]:
     return again if all(less) else found
 
 
-def _counted_from(rig: Rig, row: Moved) -> Moved:
-    """A fitted parameter against the rig as it came, where it was absent or had a prior."""
+def _counted_from(rig: Rig, added: Collection[str], row: Moved) -> Moved:
+    """A fitted parameter against the rig as it came, where it was absent or had a prior.
+
+    ``added`` are forms of what was absent, whatever held them in the fit.
+    """
+    if row.name in added:
+        return replace(row, prior_deviation=inf)
     known = rig.plant.parameters.get(row.name)
     if known is None:  # an empirical term
         return replace(row, before=0.0, prior_deviation=inf)

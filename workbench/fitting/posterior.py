@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf, isnan, nan
 
@@ -98,22 +98,17 @@ def strained(fit: Fit) -> tuple[Moved, ...]:
     return tuple(each for each in moved_parameters(fit) if each.far > FAR_MOVED)
 
 
-def moved_parameters(fit: Fit, unknown: Collection[str] = ()) -> tuple[Moved, ...]:
-    """What a fit moved, with standard deviations.
-
-    ``unknown`` are parameters of which nothing was known before, whatever held them in the fit.
-    """
+def moved_parameters(fit: Fit) -> tuple[Moved, ...]:
+    """What a fit moved, with standard deviations."""
     values, unknowns = fit.plant.values, fit.unknowns
     deviation = posterior_deviation(fit)
-    weights = zip(unknowns.names, unknowns.precision, strict=True)
-    known = [weight >= 1.0 and name not in unknown for name, weight in weights]
     return tuple(
-        Moved(name, float(prior), values[name], float(d), float(s) if k else inf)
-        for name, prior, s, k, d in zip(
+        Moved(name, float(prior), values[name], float(d), float(s) if w >= 1.0 else inf)
+        for name, prior, s, w, d in zip(
             unknowns.names,
             unknowns.prior,
             unknowns.scale,
-            known,
+            unknowns.precision,
             deviation,
             strict=True,
         )
