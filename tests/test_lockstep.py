@@ -88,8 +88,8 @@ def every_operation():
 @needs_lanes
 def test_every_operation_is_that_of_casadi_to_the_last_bit(tmp_path):
     every = every_operation()
-    points = np.array([*product(NUMBERS, repeat=2)])
-    assert len(points) % 4 == 0
+    points = np.array([*product(NUMBERS, repeat=2), *[(1.0, 2.0)] * 4])
+    assert len(points) % 8 == 0
     code = driver(tmp_path, EACH)
     library = lane_library(code, {"SIZE": every.numel_out(0)}, {"one": every})
     found = np.empty((len(points), every.numel_out(0)))
@@ -153,7 +153,7 @@ def test_an_output_that_is_always_zero_keeps_its_row(drive):
     found, zero = drawn(drive, 4 * LENGTH), ca.SX(1, 1)
     model = replace(drive.model, outputs=ca.vertcat(zero, drive.model.outputs))
     model = replace(model, measured=("none", *model.measured))
-    given = found.x[:, ::LENGTH], found.u, found.d, np.tile(found.p[:, None], 4), 4, 1
+    given = found.x[:, ::LENGTH], found.u, found.d, np.tile(found.p[:, None], 4), 1
 
     rows = model.lockstep(DT)(*given)
 
@@ -167,10 +167,10 @@ def test_which_runs_share_lanes_changes_nothing(drive):
     given = at.x[:, ::LENGTH], at.u, at.d, np.tile(at.p[:, None], 6)
     run = drive.model.lockstep(DT)
 
-    found = [run(*given, alike, threads) for alike, threads in ((6, 1), (1, 2), (3, 2))]
+    found = [run(*given, threads) for threads in (1, 2, 5)]
 
-    np.testing.assert_array_equal(bits(found[0]), bits(found[1]))
-    np.testing.assert_array_equal(bits(found[0]), bits(found[2]))
+    for other in found[1:]:
+        np.testing.assert_array_equal(bits(other), bits(found[0]))
 
 
 @needs_lanes
@@ -178,10 +178,10 @@ def test_a_run_that_is_lost_takes_no_other_with_it(drive):
     found = drawn(drive, 4 * LENGTH)
     x, p = found.x[:, ::LENGTH].copy(), np.tile(found.p[:, None], 4)
     run = drive.model.lockstep(DT)
-    whole = run(x, found.u, found.d, p, 4, 2)
+    whole = run(x, found.u, found.d, p, 2)
     x[:, 1] = np.nan
 
-    after = run(x, found.u, found.d, p, 4, 2)
+    after = run(x, found.u, found.d, p, 2)
 
     lost = np.repeat([False, True, False, False], LENGTH)
     assert np.isnan(after[:, lost]).any() and np.isfinite(after[:, ~lost]).all()
@@ -193,11 +193,9 @@ def test_shapes_that_do_not_fit_are_refused(drive):
     found, run = drawn(drive, 2 * LENGTH), drive.model.lockstep(DT)
     x, p = found.x[:, ::LENGTH], np.tile(found.p[:, None], 2)
     with pytest.raises(ValueError, match="lockstep takes"):
-        run(x, found.u, found.d, p[:, :1], 2, 1)
-    with pytest.raises(ValueError, match="runs by 3, given are 2"):
-        run(x, found.u, found.d, p, 3, 1)
+        run(x, found.u, found.d, p[:, :1], 1)
     with pytest.raises(ValueError, match="given are 0"):
-        run(x[:, :0], found.u[:, :0], found.d[:, :0], p[:, :0], 1, 1)
+        run(x[:, :0], found.u[:, :0], found.d[:, :0], p[:, :0], 1)
 
 
 def test_an_operation_without_lanes_is_named():

@@ -1,12 +1,10 @@
-"""Many runs of one model side by side, in lockstep on the lanes of the vector unit.
+"""Many runs of one model side by side, on the lanes of the vector unit.
 
 A fit asks for a few hundred windows of a plant with a few dozen sets of values.  In lanes all of
-them take half to two thirds of the time, by how many steps are refined.  A step whose error does
-not pass is refined in the lanes that need it while the others wait, as deep as
-:mod:`workbench.rosenbrock` goes; so lanes of one window under different values go together, which
-meet an end or break away at the same time.  Every lane gives what
-:meth:`workbench.model.Model.run` gives, to the last bit.  A run that is lost, whose every step is
-refined to the end, holds up the others of its lanes.
+them take a third to half of the time.  A step whose error does not pass is refined as deep as
+:mod:`workbench.rosenbrock` goes, by its own lane: each is at its own sample and its own step of it,
+all try theirs in one call, and a lane whose run is at its end takes the next, so that none waits
+for another.  Every lane gives what :meth:`workbench.model.Model.run` gives, to the last bit.
 """
 
 from __future__ import annotations
@@ -25,8 +23,6 @@ from workbench.rosenbrock import FINER, LEVELS, checked_step, steps_of
 
 if TYPE_CHECKING:
     from workbench.model import Model
-
-GROUPS_AT_ONCE = 4  # groups of lanes that a thread takes before it asks for more
 
 DRIVER = Path(__file__).with_name("lockstep.c")
 
@@ -47,46 +43,37 @@ class Lockstep:
         return self
 
     def __call__(
-        self,
-        x0: np.ndarray,
-        u: np.ndarray,
-        d: np.ndarray,
-        p: np.ndarray,
-        alike: int,
-        threads: int,
+        self, x0: np.ndarray, u: np.ndarray, d: np.ndarray, p: np.ndarray, threads: int
     ) -> np.ndarray:
         """Outputs (n_y, runs L) of x0 (n_x, runs), u and d (n, runs L), and p (n_p, runs).
-
-        The runs k, k + alike, k + 2 alike and so on, which meet the same, lie next to each other.
 
         Raises
         ------
         ValueError
-            If the shapes do not fit, there are no runs, or ``alike`` does not divide their number.
+            If the shapes do not fit or there are no runs.
         """
         runs = x0.shape[1]
-        if not runs or runs % alike:
-            raise ValueError(f"lockstep takes runs by {alike}, given are {runs}")
+        if not runs:
+            raise ValueError("lockstep takes at least one run, given are 0")
         length = u.shape[1] // runs
         shapes = zip(self.sizes, (runs, runs * length, runs * length, runs), strict=False)
         for rows, shape in zip((x0, u, d, p), shapes, strict=True):
             if rows.shape != shape:
                 raise ValueError(f"lockstep takes {shape}, given is {rows.shape}")
         given = [np.ascontiguousarray(rows.T, dtype=float) for rows in (x0, u, d, p)]
-        y = np.empty((runs * length, self.sizes[-1]))
-        order = np.arange(runs).reshape(-1, alike).T.ravel().copy()
-        groups = -(-runs // self.lanes)
-        size = self.lanes * max(min(GROUPS_AT_ONCE, groups // (2 * threads)), 1)
-        parts = [order[k : k + size] for k in range(0, runs, size)]
+        y, taken = np.empty((runs * length, self.sizes[-1])), np.zeros(1, dtype=np.int64)
+        threads = min(threads, runs)
+        lanes = min(self.lanes, -(-runs // threads))
+        states = np.empty((threads, lanes, length, self.sizes[0]))
 
-        def run(part: np.ndarray) -> None:
-            self._run(len(part), address(part), length, *map(address, given), address(y))
+        def run(own: np.ndarray) -> None:
+            self._run(runs, length, lanes, *map(address, (*given, y, taken, own)))
 
-        if len(parts) == 1:
-            run(parts[0])
+        if threads == 1:
+            run(states[0])
             return y.T
         with ThreadPoolExecutor(threads) as several:
-            list(several.map(run, parts))
+            list(several.map(run, states))
         return y.T
 
 
@@ -109,5 +96,5 @@ def lockstep(model: Model, sample_time_s: float) -> Lockstep | None:
     if found is None:
         return None
     count, place = ctypes.c_longlong, ctypes.c_void_p
-    run = declared(found.run, [count, place, count, *[place] * 5])
+    run = declared(found.run, [count, count, ctypes.c_int, *[place] * 7])
     return Lockstep(sizes, found.lanes(), run)

@@ -99,7 +99,7 @@ def _simulated(plant: Plant, readings: Sequence[Recording], where: Probe) -> np.
     x0 = np.where(absurd, plant.initial[:, None], x0)
     p = np.tile(plant.nominal[2][:, None], count)
     runs = WindowRuns(plant.model, dt, length)
-    y = runs.outputs(x0, u, d, p, alike=len(firsts))
+    y = runs.outputs(x0, u, d, p)
     sent = y.reshape(len(plant.measured), count, length)
     sent[:, absurd] = np.nan
     return received_windows(plant, sent, (firsts,) * len(readings), dt)

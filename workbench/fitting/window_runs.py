@@ -25,20 +25,17 @@ class WindowRuns:
     sample_time_s: float
     length: int
 
-    def outputs(
-        self, x0: np.ndarray, u: np.ndarray, d: np.ndarray, p: np.ndarray, alike: int
-    ) -> np.ndarray:
+    def outputs(self, x0: np.ndarray, u: np.ndarray, d: np.ndarray, p: np.ndarray) -> np.ndarray:
         """Outputs (n_y, runs L) of starts (n_x, runs), inputs (n, runs L) and values (n_p, runs).
 
-        ``x0`` is the start as the sensors show it.  The runs k, k + alike and so on are those of
-        one window, which go in lanes best side by side.
+        ``x0`` is the start as the sensors show it.
         """
         together, runs = self.model.lockstep(self.sample_time_s), x0.shape[1]
         if together is None:
             return result(self._by_casadi(runs), x0, u, d, p)
         first = slice(None, None, self.length)
         begun = result(self._begin.map(runs), x0, u[:, first], d[:, first], p)
-        return together(begun, u, d, p, alike, THREADS)
+        return together(begun, u, d, p, THREADS)
 
     def _by_casadi(self, runs: int) -> ca.Function:
         """So many runs; built once."""

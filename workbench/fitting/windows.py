@@ -179,7 +179,7 @@ class Windows:
         u, d = (np.hstack([each[k] for each in fed]) for k in (0, 1))
         p = np.hstack([np.tile(plant.nominal[2][:, None], len(self)) for plant in plants])
         x0 = np.hstack(list(starts)) if starts.shape[1] else np.zeros((0, p.shape[1]))
-        y = self._runs.outputs(x0, u, d, p, alike=len(self))
+        y = self._runs.outputs(x0, u, d, p)
         n_y, n = len(self.plant.measured), len(self)
         sent = y.reshape(n_y, len(plants), n, self.length).transpose(1, 0, 2, 3)
         dt = self.recordings[0].sample_time_s
