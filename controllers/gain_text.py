@@ -1,9 +1,9 @@
-"""The gains of a design as text for people: each number with name, unit and four digits."""
+"""The gains of a design with names and units, as numbers and as text of four digits."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -17,10 +17,33 @@ OUTER = {"stiffness": "N/m", "damping": "N s/m", "restoring": "N/(m s)"}
 """The outer gains of a cascade, in their order."""
 
 
-def gains(controller: Controller) -> Iterator[tuple[str, str]]:
+@dataclass(frozen=True)
+class NamedGain:
+    """One number of a law."""
+
+    name: str
+    value: float
+    unit: str
+
+    @property
+    def text(self) -> str:
+        """As people read it."""
+        return f"{self.name} {self.value:.{DIGITS}g} {self.unit}".strip()
+
+
+@dataclass(frozen=True)
+class GainRow:
+    """The gains of one mode's law, and the poles of its closed loop in 1/s where they are known."""
+
+    name: str
+    gains: tuple[NamedGain, ...]
+    poles: np.ndarray | None = None
+
+
+def gain_rows(controller: Controller) -> Iterator[GainRow]:
     """The numbers of each mode's design, forward then backward, where it has gains.
 
-    The poles of a mode follow its gains; a leg has those of each joint.
+    A leg has those of each joint.
     """
     parts = getattr(controller, "regulators", (controller,))
     for part in parts:
@@ -28,6 +51,14 @@ def gains(controller: Controller) -> Iterator[tuple[str, str]]:
         body = f"{states[0].rpartition('.')[0]}, " if len(parts) > 1 else ""
         if schedule is not None:
             yield from _of_axis(schedule, states, body)
+
+
+def gains(controller: Controller) -> Iterator[tuple[str, str]]:
+    """The same in words, by name; the poles of a mode follow its gains."""
+    for row in gain_rows(controller):
+        yield row.name, ", ".join(gain.text for gain in row.gains)
+        if row.poles is not None:
+            yield f"{row.name}, poles", f"{_poles(row.poles)} 1/s"
 
 
 def _states(part: Any) -> tuple[str, ...]:
@@ -38,17 +69,15 @@ def _states(part: Any) -> tuple[str, ...]:
     return (signal,) if signal else STATES
 
 
-def _of_axis(schedule: Any, states: tuple[str, ...], body: str) -> Iterator[tuple[str, str]]:
+def _of_axis(schedule: Any, states: tuple[str, ...], body: str) -> Iterator[GainRow]:
     unit = si_unit(states[0])
     for way in ("forward", "backward"):
         for place, gain in zip(schedule.positions_m, getattr(schedule, way), strict=True):
             name = f"{body}{way} at {place:.{DIGITS}g} {unit}"
-            yield name, ", ".join(_numbers(gain, states, unit))
-            if hasattr(gain, "poles"):
-                yield f"{name}, poles", f"{_poles(gain.poles)} 1/s"
+            yield GainRow(name, tuple(_numbers(gain, states, unit)), getattr(gain, "poles", None))
 
 
-def _numbers(gain: Any, states: tuple[str, ...], unit: str) -> Iterator[str]:
+def _numbers(gain: Any, states: tuple[str, ...], unit: str) -> Iterator[NamedGain]:
     units = {
         "proportional": f"V/{unit}",
         "integral": f"V/({unit} s)",
@@ -59,19 +88,15 @@ def _numbers(gain: Any, states: tuple[str, ...], unit: str) -> Iterator[str]:
     for each in fields(gain):
         value = getattr(gain, each.name)
         if each.name == "feedback":
-            yield from (f"{_short(n)} {_quantity(v, _per(n))}" for n, v in _pairs(states, value))
+            yield from (NamedGain(_short(n), v, _per(n)) for n, v in _pairs(states, value))
         elif each.name == "outer":
-            yield from (f"{n} {_quantity(v, OUTER[n])}" for n, v in _pairs(OUTER, value))
+            yield from (NamedGain(n, v, OUTER[n]) for n, v in _pairs(OUTER, value))
         elif each.name != "poles":
-            yield f"{each.name} {_quantity(value, units.get(each.name, ''))}"
+            yield NamedGain(each.name, value, units.get(each.name, ""))
 
 
 def _pairs(names: Iterable[str], values: np.ndarray) -> Iterator[tuple[str, float]]:
-    return zip(names, values, strict=True)
-
-
-def _quantity(value: float, unit: str) -> str:
-    return f"{value:.{DIGITS}g} {unit}".strip()
+    return zip(names, map(float, values), strict=True)
 
 
 def _per(state: str) -> str:

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from math import degrees, isinf
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from studies.instability_text import UNSTABLE, unstable_text
 from studies.text import columns, number
 
 if TYPE_CHECKING:
     from controllers.certificate import Certificate
-    from controllers.design_file import Design
     from controllers.foresight import Delays
     from controllers.hybrid_mpc import HybridMpc
     from controllers.margins import Margins
+    from studies.design_report import DesignReport
 
 HEAD = (
     "mode",
@@ -40,34 +40,16 @@ FORESEEN = "foreseen by each mode as by the estimators of `check` (the certifica
 DRY = "margins of linear modes say nothing of dry friction: `workbench check` is what counts"
 
 
-def design_texts(found: Design, say: Callable[[str], None]) -> Iterator[str]:
+def design_texts(found: DesignReport) -> Iterator[str]:
     """What is known of a design: margins of each mode, and what is certified across them."""
-    made = found.controller
-    if found.method == "hybrid-mpc":
+    made = found.design.controller
+    if found.design.method == "hybrid-mpc":
         yield search_text(made)
-        return
-    if not hasattr(made, "laws") and not hasattr(made, "regulators"):
+    elif not found.laws:
         yield NO_LAWS
-        return
-    for part in getattr(made, "regulators", (made,)):
-        yield from _part_texts(found, part, say)
-
-
-def _part_texts(found: Design, part: Any, say: Callable[[str], None]) -> Iterator[str]:
-    """Of the laws of one axis; the certificate takes what is foreseen as foreseen exactly."""
-    from controllers.certificate import certificate
-    from controllers.foresight import delays_of, foreseeing
-    from controllers.margins import loops, margins
-
-    hybrid, sample_time_s = found.hybrid, found.controller.sample_time_s
-    axis, delays, laws = getattr(part, "axis", None), delays_of(found.plant, part), part.laws
-    ahead = foreseeing(hybrid, laws, sample_time_s, axis) if delays.foreseen else laws
-    whole = (hybrid, ahead, sample_time_s, delays.both_s, axis)
-    unstable = unstable_text(loops(*whole), sample_time_s)
-    yield margins_text(margins(*whole), delays, unstable)
-    say("looking for a certificate across modes")
-    closed = loops(hybrid, laws, sample_time_s, delays.left_s, axis)
-    yield certificate_text(certificate(closed, sample_time_s))
+    for part in found.laws:
+        yield margins_text(part.margins, part.delays, unstable_text(part.growth))
+        yield certificate_text(part.certificate)
 
 
 def margins_text(

@@ -57,8 +57,7 @@ def growth_of(closed: np.ndarray, sample_time_s: float) -> Growth | None:
     return Growth(grows_s, min(turn, pi) / (tau * sample_time_s))
 
 
-def unstable_text(loops: Mapping[str, tuple[np.ndarray, ...]], sample_time_s: float) -> str:
+def unstable_text(growth: Mapping[str, Growth]) -> str:
     """A line for each unstable mode under its own law, and how far to trust it."""
-    found = {name: growth_of(own, sample_time_s) for name, (own, *_) in loops.items()}
-    lines = [f"unstable: {name}: {growth.words}" for name, growth in found.items() if growth]
+    lines = [f"unstable: {name}: {each.words}" for name, each in growth.items()]
     return "\n".join([*lines, FRICTION]) if lines else UNSTABLE

@@ -14,6 +14,7 @@ from controllers.scheduled import driven_modes
 from linearize.reduction import closed_command
 from linearize.standard import axis_modes
 from studies.closed_loop_check import check
+from studies.design_report import design_report
 from studies.design_text import design_texts
 from studies.following_check import check_followed
 from workbench.errors import InputError
@@ -44,7 +45,7 @@ def test_the_gains_of_the_papers_are_given_in_a_table_of_the_specification(tmp_p
     found = read_design(path).controller
 
     assert set(found.gains.forward + found.gains.backward) == {PAPER_GAINS[plant.name]}
-    printed = [*design_texts(read_design(path), lambda said: None)]
+    printed = [*design_texts(design_report(read_design(path), lambda said: None))]
     assert "slide - " in printed[0]
 
 
@@ -105,6 +106,6 @@ def test_the_default_design_brings_a_drive_to_its_place_and_does_not_swing():
 
 
 def test_design_says_that_margins_know_no_dry_friction():
-    (text, _) = design_texts(design("axis-pid", crr_arm()), lambda said: None)
+    (text, _) = design_texts(design_report(design("axis-pid", crr_arm()), lambda said: None))
 
     assert "say nothing of dry friction: `workbench check` is what counts" in text

@@ -48,9 +48,8 @@ def test_no_design_is_written_where_a_number_leads_nowhere(rig, tmp_path, method
 def test_no_design_is_written_where_nothing_can_be_told_of_it(rig, tmp_path, monkeypatch):
     def failing(found, say):
         raise ValueError("Invalid inputs.")
-        yield
 
-    monkeypatch.setattr("studies.design_text.design_texts", failing)
+    monkeypatch.setattr("studies.design_report.design_report", failing)
     answer = call("design", rig, "--controller", "lq", "-o", tmp_path / "lq.toml")
 
     assert answer.exit_code == 2 and not [*tmp_path.iterdir()]

@@ -8,6 +8,7 @@ from controllers.design_file import design
 from controllers.foresight import delays_of, foresighted
 from controllers.margins import both_ways_s, closed, margins, margins_of
 from controllers.scheduled import driven_modes
+from studies.design_report import design_report
 from studies.design_text import design_texts
 from studies.text import number
 from workbench.plants.crr_rig import crr_rig
@@ -90,7 +91,7 @@ def test_a_law_on_the_measurement_has_the_margins_that_it_was_tuned_for():
     found = design("axis-pid", crr_rig(), {"tuning": {"bandwidth_hz": 5.0}})
     delays = delays_of(found.plant, found.controller)
     hybrid, laws, dt = found.hybrid, found.controller.laws, found.controller.sample_time_s
-    printed = "\n".join(design_texts(found, lambda said: None))
+    printed = "\n".join(design_texts(design_report(found, lambda said: None)))
     tuned = margins(hybrid, laws, dt, both_ways_s(found.plant))
 
     assert (delays.both_s, delays.foreseen) == (pytest.approx(2e-3), False)

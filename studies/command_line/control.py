@@ -96,6 +96,7 @@ def design(
     ],
     output: Output,
     spec: Spec = None,
+    json: Json = None,
     quiet: Quiet = False,
 ) -> None:
     """One design per mode, written as a file that `check` reads.
@@ -107,12 +108,14 @@ def design(
     with answering(quiet) as say:
         from controllers.design_file import design as design_controller
         from controllers.design_file import gains, write_design
+        from studies.design_document import design_document
+        from studies.design_report import design_report
         from studies.design_text import design_texts
         from studies.sample_times import require_multiple
         from studies.specification import design_numbers, read_specification
         from workbench.rig import load_rig
 
-        writable(output)
+        writable(output, json)
         known = load_rig(rig)
         asked = read_specification(spec, known) if spec else None
         numbers = design_numbers(asked, controller, known.plant) if asked else {}
@@ -121,11 +124,13 @@ def design(
             found = design_controller(controller, known.plant, numbers)
             time_s, name = found.controller.sample_time_s, f"{controller}.sample_time_s"
             require_multiple(known.plant, time_s, name)
-        told = [*design_texts(found, say)]  # before the file: what cannot be told is not written
+        report = design_report(found, say)  # before the file: what cannot be told is not written
         write_design(found, output)
+        if json:
+            write_json(json, design_document(known.name, report))
         for name, gain in gains(found.controller):
             typer.echo(f"{name}: {gain}")
-        for part in told:
+        for part in design_texts(report):
             typer.echo(part)
         typer.echo(f"wrote {output}")
         if asked and asked.asked:

@@ -14,6 +14,7 @@ from linearize.prediction import prediction_of
 from linearize.stopped import has_stops
 from linearize.visits import joined, recorded_visits, windows
 from studies.checking import Checked, loops_of, recorded_runs, styled_figures
+from studies.design_report import design_report
 from studies.design_text import design_texts
 from studies.mode_choice import FINE, chosen_modes, regions_of
 from studies.mode_pictures import figures_of_modes
@@ -122,7 +123,7 @@ def close_loops(
     say(f"designing {method}")
     found = design(method, rig.plant, numbers)
     require_multiple(rig.plant, found.controller.sample_time_s, f"{method}.sample_time_s")
-    told, path = tuple(design_texts(found, say)), Path(target)
+    told, path = tuple(design_texts(design_report(found, say))), Path(target)
     write_design(found, path)
     loops = loops_of(rig, {path: path.read_text(encoding="utf-8")}, estimators, scenarios)
     checked = recorded_runs(loops, runs, say)
