@@ -4,7 +4,7 @@ import pickle
 
 import numpy as np
 import pytest
-from test_lockstep import needs_lanes
+from test_ensemble import needs_lanes
 
 from controllers.design_file import design
 from controllers.shift_prediction import query

@@ -1,8 +1,8 @@
 """SX functions as C that takes several points at once, one in each lane of the vector unit.
 
-A processor divides four numbers in the time it needs for one or two.  CasADi writes C for one
-point; here the same instructions are written on vectors of LANES numbers (GCC's and Clang's vector
-types), so that what is run side by side goes in lockstep.  Each lane gives what CasADi gives, to
+A processor divides four or eight numbers in the time it needs for one or two.  CasADi writes C for
+one point; here the same instructions are written on vectors of LANES numbers (GCC's and Clang's
+vector types), so that several points are asked in one call.  Each lane gives what CasADi gives, to
 the last bit: no sum is reordered, no product contracted, and what the vector unit lacks (exp, log,
 powers, sines) is asked lane by lane from the same library.  Of the smaller or larger of +0 and -0,
 whose sign C leaves open, lanes take what CasADi's virtual machine takes.

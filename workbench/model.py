@@ -11,7 +11,7 @@ import numpy as np
 
 from workbench.compiled import compiled
 from workbench.effect import Conditions, Expression, MassFlow, Term
-from workbench.lockstep import Lockstep, lockstep
+from workbench.ensemble import Ensemble, ensemble
 from workbench.rosenbrock import controlled_step
 
 BLOCK = 20  # samples of one call
@@ -67,7 +67,7 @@ class Model:
     _steps: dict[float, ca.Function] = field(default_factory=dict, init=False, repr=False)
     _compiled: dict[float, ca.Function] = field(default_factory=dict, init=False, repr=False)
     _blocks: dict[float, ca.Function] = field(default_factory=dict, init=False, repr=False)
-    _lockstep: dict[float, Lockstep | None] = field(default_factory=dict, init=False, repr=False)
+    _ensemble: dict[float, Ensemble | None] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
     def f(self) -> ca.Function:
@@ -130,11 +130,11 @@ class Model:
             self._blocks[sample_time_s] = compiled(self.block(sample_time_s))
         return self._blocks[sample_time_s]
 
-    def lockstep(self, sample_time_s: float) -> Lockstep | None:
+    def ensemble(self, sample_time_s: float) -> Ensemble | None:
         """Outputs of many windows side by side in lanes; None where that cannot be had."""
-        if sample_time_s not in self._lockstep:
-            self._lockstep[sample_time_s] = lockstep(self, sample_time_s) if self.states else None
-        return self._lockstep[sample_time_s]
+        if sample_time_s not in self._ensemble:
+            self._ensemble[sample_time_s] = ensemble(self, sample_time_s) if self.states else None
+        return self._ensemble[sample_time_s]
 
 
 def flow_paths(flows: Iterable[tuple[str, Term]]) -> tuple[FlowPath, ...]:

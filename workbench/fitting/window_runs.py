@@ -30,7 +30,7 @@ class WindowRuns:
 
         ``x0`` is the start as the sensors show it.
         """
-        together, runs = self.model.lockstep(self.sample_time_s), x0.shape[1]
+        together, runs = self.model.ensemble(self.sample_time_s), x0.shape[1]
         if together is None:
             return result(self._by_casadi(runs), x0, u, d, p)
         first = slice(None, None, self.length)

@@ -24,12 +24,12 @@ from workbench.rosenbrock import FINER, LEVELS, checked_step, steps_of
 if TYPE_CHECKING:
     from workbench.model import Model
 
-DRIVER = Path(__file__).with_name("lockstep.c")
+DRIVER = Path(__file__).with_name("ensemble.c")
 
 
 @dataclass(frozen=True)
-class Lockstep:
-    """Outputs of a model over windows of equal length; made by :func:`lockstep`.
+class Ensemble:
+    """Outputs of a model over windows of equal length; made by :func:`ensemble`.
 
     ``sizes`` are those of x, u, d, p and y.
     """
@@ -38,7 +38,7 @@ class Lockstep:
     lanes: int
     _run: Callable[..., None] = field(repr=False)
 
-    def __deepcopy__(self, memo: object) -> Lockstep:
+    def __deepcopy__(self, memo: object) -> Ensemble:
         """Itself: it never changes, and its library has one address."""
         return self
 
@@ -54,12 +54,12 @@ class Lockstep:
         """
         runs = x0.shape[1]
         if not runs:
-            raise ValueError("lockstep takes at least one run, given are 0")
+            raise ValueError("ensemble takes at least one run, given are 0")
         length = u.shape[1] // runs
         shapes = zip(self.sizes, (runs, runs * length, runs * length, runs), strict=False)
         for rows, shape in zip((x0, u, d, p), shapes, strict=True):
             if rows.shape != shape:
-                raise ValueError(f"lockstep takes {shape}, given is {rows.shape}")
+                raise ValueError(f"ensemble takes {shape}, given is {rows.shape}")
         given = [np.ascontiguousarray(rows.T, dtype=float) for rows in (x0, u, d, p)]
         y, taken = np.empty((runs * length, self.sizes[-1])), np.zeros(1, dtype=np.int64)
         threads = min(threads, runs)
@@ -77,7 +77,7 @@ class Lockstep:
         return y.T
 
 
-def lockstep(model: Model, sample_time_s: float) -> Lockstep | None:
+def ensemble(model: Model, sample_time_s: float) -> Ensemble | None:
     """Runs of a model side by side; None where there is no compiler or an operation has no lanes.
 
     Build it once: its C is written and looked for in the cache at every call.
@@ -97,4 +97,4 @@ def lockstep(model: Model, sample_time_s: float) -> Lockstep | None:
         return None
     count, place = ctypes.c_longlong, ctypes.c_void_p
     run = declared(found.run, [count, count, ctypes.c_int, *[place] * 7])
-    return Lockstep(sizes, found.lanes(), run)
+    return Ensemble(sizes, found.lanes(), run)

@@ -1,4 +1,4 @@
-"""Runs in lockstep give what CasADi's own functions give, to the last bit, and are never needed."""
+"""Runs side by side give what CasADi's own functions give, to the last bit, and are never needed."""
 
 import ctypes
 import logging
@@ -19,7 +19,7 @@ from test_compiled import HAS_COMPILER, cache, needs_compiler  # noqa: F401
 from workbench.compiled import COMPILERS
 from workbench.fitting.windows import cut_windows
 from workbench.lanes import OPERATIONS, NoLanesError, address, lane_library, lanes_of
-from workbench.lockstep import lockstep
+from workbench.ensemble import ensemble
 from workbench.recording import Recording
 
 DT, LENGTH = 1e-3, 12
@@ -123,17 +123,17 @@ def with_something_missing(plant, most=5):
 
 @needs_lanes
 @pytest.mark.parametrize("dt", [DT, 2.5e-3])
-def test_every_plant_runs_in_lockstep_to_the_last_bit(plant, dt, monkeypatch):
+def test_every_plant_runs_in_lanes_to_the_last_bit(plant, dt, monkeypatch):
     """Half a typical size off rest pistons strike their ends, and steps are refined.
 
     A sample of 2.5 ms takes three steps.
     """
     windows, starts = cut(plant, dt)
     several = with_something_missing(plant)
-    assert bool(plant.model.lockstep(dt)) == bool(plant.model.states)
+    assert bool(plant.model.ensemble(dt)) == bool(plant.model.states)
     together = windows.simulated(several, starts)
 
-    monkeypatch.setitem(plant.model._lockstep, dt, None)
+    monkeypatch.setitem(plant.model._ensemble, dt, None)
     by_casadi = windows.simulated(several, starts)
 
     np.testing.assert_array_equal(bits(together), bits(by_casadi))
@@ -155,17 +155,17 @@ def test_an_output_that_is_always_zero_keeps_its_row(drive):
     model = replace(model, measured=("none", *model.measured))
     given = found.x[:, ::LENGTH], found.u, found.d, np.tile(found.p[:, None], 4), 1
 
-    rows = model.lockstep(DT)(*given)
+    rows = model.ensemble(DT)(*given)
 
     assert not rows[0].any()
-    np.testing.assert_array_equal(rows[1:], drive.model.lockstep(DT)(*given))
+    np.testing.assert_array_equal(rows[1:], drive.model.ensemble(DT)(*given))
 
 
 @needs_lanes
 def test_which_runs_share_lanes_changes_nothing(drive):
     at = drawn(drive, 6 * LENGTH)
     given = at.x[:, ::LENGTH], at.u, at.d, np.tile(at.p[:, None], 6)
-    run = drive.model.lockstep(DT)
+    run = drive.model.ensemble(DT)
 
     found = [run(*given, threads) for threads in (1, 2, 5)]
 
@@ -177,7 +177,7 @@ def test_which_runs_share_lanes_changes_nothing(drive):
 def test_a_run_that_is_lost_takes_no_other_with_it(drive):
     found = drawn(drive, 4 * LENGTH)
     x, p = found.x[:, ::LENGTH].copy(), np.tile(found.p[:, None], 4)
-    run = drive.model.lockstep(DT)
+    run = drive.model.ensemble(DT)
     whole = run(x, found.u, found.d, p, 2)
     x[:, 1] = np.nan
 
@@ -190,9 +190,9 @@ def test_a_run_that_is_lost_takes_no_other_with_it(drive):
 
 @needs_lanes
 def test_shapes_that_do_not_fit_are_refused(drive):
-    found, run = drawn(drive, 2 * LENGTH), drive.model.lockstep(DT)
+    found, run = drawn(drive, 2 * LENGTH), drive.model.ensemble(DT)
     x, p = found.x[:, ::LENGTH], np.tile(found.p[:, None], 2)
-    with pytest.raises(ValueError, match="lockstep takes"):
+    with pytest.raises(ValueError, match="ensemble takes"):
         run(x, found.u, found.d, p[:, :1], 1)
     with pytest.raises(ValueError, match="given are 0"):
         run(x[:, :0], found.u[:, :0], found.d[:, :0], p[:, :0], 1)
@@ -209,7 +209,7 @@ def test_an_operation_without_lanes_is_named():
 def test_without_a_compiler_there_are_no_lanes(cache, monkeypatch, drive):  # noqa: F811
     monkeypatch.setenv("WORKBENCH_NO_COMPILER", "1")
 
-    assert lockstep(drive.model, DT) is None
+    assert ensemble(drive.model, DT) is None
 
 
 @needs_compiler
