@@ -1,4 +1,4 @@
-"""Runs side by side give what CasADi's own functions give, to the last bit, and are never needed."""
+"""Runs side by side give what CasADi gives, to the last bit, and are never needed."""
 
 import ctypes
 import logging
@@ -17,9 +17,9 @@ from conftest import drawn
 from test_compiled import HAS_COMPILER, cache, needs_compiler  # noqa: F401
 
 from workbench.compiled import COMPILERS
+from workbench.ensemble import ensemble
 from workbench.fitting.windows import cut_windows
 from workbench.lanes import OPERATIONS, NoLanesError, address, lane_library, lanes_of
-from workbench.ensemble import ensemble
 from workbench.recording import Recording
 
 DT, LENGTH = 1e-3, 12
