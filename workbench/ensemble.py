@@ -1,7 +1,8 @@
 """Many runs of one model side by side, on the lanes of the vector unit.
 
-A fit asks for a few hundred windows of a plant with a few dozen sets of values.  In lanes all of
-them take a third to half of the time.  A step whose error does not pass is refined as deep as
+A fit asks for a few hundred windows of a plant with a few dozen sets of values.  Beside CasADi's
+own map lanes are 2.4 to 2.9 times as fast on a processor with eight of them (``pytest
+tests/benchmarks/test_speed_of_ensemble.py -s --benchmark-enable``).  A step whose error does not pass is refined as deep as
 :mod:`workbench.rosenbrock` goes, by its own lane: each is at its own sample and its own step of it,
 all try theirs in one call, and a lane whose run is at its end takes the next, so that none waits
 for another.  Every lane gives what :meth:`workbench.model.Model.run` gives, to the last bit.
