@@ -240,8 +240,10 @@ def moves_of(N: int) -> np.ndarray:
     return np.eye(N) - np.eye(N, k=-1)
 
 
-def limits_of(plant: Plant, spec: MpcSpec) -> np.ndarray:
+def limits_of(plant: Plant, spec: MpcSpec, method: str = "mpc") -> np.ndarray:
     """Lowest and highest position, velocity and pressures, shape (2, 4).
+
+    ``method`` is the controller whose numbers they are.
 
     Raises
     ------
@@ -255,7 +257,7 @@ def limits_of(plant: Plant, spec: MpcSpec) -> np.ndarray:
         what = f"margin_m {spec.margin_m:g}, lowest_pa {spec.lowest_pa:g} and below_supply_pa "
         what += f"{spec.below_supply_pa:g} leave no room on {plant.name}"
         expected = "less than half the stroke and the supply pressure"
-        raise InputError(Message(what, "mpc", expected))
+        raise InputError(Message(what, method, expected))
     return np.array([low, high])
 
 

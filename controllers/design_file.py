@@ -7,7 +7,7 @@ follow from the rest, so reading designs anew: a file cannot say one thing and d
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
@@ -35,9 +35,9 @@ from workbench.contracts import Controller
 from workbench.errors import InputError, Message, UnknownNameError, listed, nearest, whole_file
 from workbench.plant import Plant
 from workbench.plant_files import as_it_came, plant_named, plant_text
-from workbench.rig_laws import laws_of, with_laws
+from workbench.rig_laws import law_terms, laws_of, with_laws
 from workbench.rig_text import RigText, quoted, read_text
-from workbench.units import si_unit
+from workbench.units import public_name, si_unit
 
 PLANTS = {
     slide_modes: SLIDE_MODES,
@@ -141,7 +141,7 @@ def parse_design(text: str, path: Path) -> Design:
     plant = _plant(file, path.parent)
     numbers = _needed(file, ("spec",), dict, {}, "a table of the controller's numbers")
     file.finish()
-    with _placed(file, ("controller",), method):
+    with _placed(file, ("controller",), method, plant.values):
         return design(method, plant, numbers)
 
 
@@ -156,7 +156,7 @@ def _needed(file: RigText, place: tuple[str, ...], kind: type, default: Any, exp
 def _plant(file: RigText, folder: Path) -> Plant | None:
     """The plant of a file, none where it has no such plant; complaints go to the file."""
     place = _needed(file, ("plant",), dict, {}, "a table with the plant's name and values")
-    if not place:
+    if not isinstance(file.tree.get("plant"), dict):
         return None
     file.keys_among(("plant",), place, ("name", "removed", "laws", "values"))
     name = _needed(file, ("plant", "name"), str, "", "the name of a plant")
@@ -166,8 +166,9 @@ def _plant(file: RigText, folder: Path) -> Plant | None:
     file.finish()
     with _placed(file, ("plant", "name")):
         plant = with_laws(plant_named(name, folder), laws)
-    known = [effect.name for effect in plant.effects]
-    for key, names in (("removed", removed), ("laws", laws)):
+    terms = dict.fromkeys((*law_terms(plant), *(term.name for term in laws_of(plant))))
+    effects = [effect.name for effect in plant.effects]
+    for key, names, known in (("removed", removed, effects), ("laws", laws, terms)):
         for each in names:
             if each not in known:
                 file.unknown(("plant", key), plant.name, known, item=each)
@@ -191,10 +192,18 @@ def _with_values(file: RigText, plant: Plant, values: Mapping[str, Any]) -> Plan
 
 
 @contextmanager
-def _placed(file: RigText, usual: tuple[str, ...], method: str = "") -> Iterator[None]:
-    """Complaints of what is built from a file with their lines: of a number, else the usual one."""
+def _placed(
+    file: RigText, usual: tuple[str, ...], method: str = "", values: Iterable[str] = ()
+) -> Iterator[None]:
+    """Complaints of what is built from a file with their lines: of a number, else the usual one.
+
+    A number is one of the method's, or a value of the plant by its public name.
+    """
+    full = {public_name(name): name for name in values}
 
     def place(message: Message) -> tuple[str, ...]:
+        if message.name in full:
+            return ("plant", "values", full[message.name])
         above, _, rest = message.name.partition(".")
         return ("spec", *rest.split(".")) if method and above == method else usual
 

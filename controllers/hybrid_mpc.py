@@ -228,11 +228,12 @@ def hybrid_mpc(hybrid: HybridModel, spec: HybridMpcSpec | None = None) -> Hybrid
     spec, plant = spec or HybridMpcSpec(), hybrid.plant
     hold = int(np.ceil(spec.hold_s / spec.sample_time_s - 1e-9))
     if hold >= spec.horizon:
-        found = f"hybrid-mpc.hold_s is {spec.hold_s:g}, {hold} of {spec.horizon} samples ahead"
-        raise InputError(Message(found, expected="a pulse that ends within the horizon"))
+        found = f"is {spec.hold_s:g}, {hold} of {spec.horizon} samples ahead"
+        expected = "a pulse that ends within the horizon"
+        raise InputError(Message(found, "hybrid-mpc.hold_s", expected))
     number = len(switching_times(0, hold))
     if spec.judged >= number**2:
-        raise InputError(Message(f"hybrid-mpc.judged is {spec.judged}", expected=f"< {number**2}"))
+        raise InputError(Message(f"is {spec.judged}", "hybrid-mpc.judged", f"< {number**2}"))
     sizes = spec.sample_time_s, spec.horizon, number
     search = PlanSearch(
         responses=tuple(valve_response(plant, v, spec.sample_time_s, hold) for v in VALVES),

@@ -186,13 +186,19 @@ def steady_plan(horizon: int, steady_v: float, place_m: float = nan) -> Plan:
 
 
 def linear_mpc(
-    hybrid: HybridModel, spec: MpcSpec | None = None, solver: Solver | None = None
+    hybrid: HybridModel,
+    spec: MpcSpec | None = None,
+    solver: Solver | None = None,
+    method: str = "mpc",
 ) -> LinearMpc:
-    """One program on every mode in which the valve drives the motion; DAQP is the usual solver."""
+    """One program on every mode in which the valve drives the motion; DAQP is the usual solver.
+
+    ``method`` is the controller that limits without room are told of.
+    """
     spec = spec or MpcSpec()
     task = positioning(hybrid, spec.positioning)
     centre_v = closed_command(hybrid.plant)
-    limits = limits_of(hybrid.plant, spec)
+    limits = limits_of(hybrid.plant, spec, method)
     sizes = centre_v, task.area_m2, limits, task.valve.openings_v
     by = solver or Daqp()
     programs = scheduled(

@@ -53,7 +53,7 @@ def along(
 def nonlinear_mpc(hybrid: HybridModel, spec: MpcSpec | None = None) -> NonlinearMpc:
     """The design on the reduced plant of the hybrid model."""
     spec = spec or MpcSpec()
-    linear = linear_mpc(hybrid, spec)
+    linear = linear_mpc(hybrid, spec, method="nonlinear-mpc")
     advance = sliding_advance(hybrid.model, spec.sample_time_s)
     rollout = Rollout(advance, spec.horizon, tuple(map(hybrid.model.states.index, STATES)))
     _ = rollout.ahead  # compiled now, so that the first sample need not wait

@@ -31,7 +31,7 @@ from controllers.spec import chosen
 from controllers.state_feedback import LqSpec
 from linearize.modes import HybridModel, Mode
 from workbench.contracts import Command, Estimate
-from workbench.plant import require
+from workbench.errors import Message, UnknownNameError, listed, nearest
 
 
 class Method(Enum):
@@ -99,7 +99,8 @@ def per_mode(hybrid: HybridModel, spec: PerModeSpec | None = None) -> PerMode:
     """
     spec = spec or PerModeSpec()
     names = [mode.name for side in driven_modes(hybrid) for mode in side]
-    require(spec.modes, names, "the modes in which the valve drives the motion")
+    if unknown := [_unknown(name, names) for name in spec.modes if name not in names]:
+        raise UnknownNameError(*unknown)
     task = positioning(hybrid, spec.positioning)
 
     def gain(mode: Mode) -> Gain:
@@ -107,6 +108,12 @@ def per_mode(hybrid: HybridModel, spec: PerModeSpec | None = None) -> PerMode:
         return GAINS[method](mode, task.area_m2, spec.sample_time_s)
 
     return PerMode(task, scheduled(hybrid, gain), spec.sample_time_s)
+
+
+def _unknown(name: str, known: list[str]) -> Message:
+    what = "the modes in which the valve drives the motion have no such name"
+    expected = f"one of {listed(known, len(known))}"
+    return Message(what, f"per-mode.modes.{name}", expected, nearest(name, known))
 
 
 def _lq(mode: Mode, _area_m2: float, sample_time_s: float) -> Gain:

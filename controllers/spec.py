@@ -103,12 +103,13 @@ def _choices(
     known = {kind.value: kind for kind in kinds}
     if not isinstance(choices, Mapping):
         return {}, [Message(f"{choices!r} is no table", where, f"by mode, {listed(known)}")]
+    right = {n: known[v] for n, v in choices.items() if isinstance(v, str) and v in known}
     wrong = [
         Message(f"is {value!r}", f"{where}.{name}", listed(known), nearest(str(value), known))
         for name, value in choices.items()
-        if value not in known
+        if name not in right
     ]
-    return {name: known[value] for name, value in choices.items() if value in known}, wrong
+    return right, wrong
 
 
 def _refused(known: Field, default: float, value: object) -> str:

@@ -43,12 +43,14 @@ def operating_point(
     free: tuple[str, ...] = (),
     vanish: tuple[str, ...] = (),
     steps: int = STEPS,
+    nearby: bool = False,
 ) -> OperatingPoint:
     """The point with the given values, and with the free ones such that the named rates vanish.
 
-    Damped Newton in scaled variables, at most so many steps.  Names are states and commands; what
-    is neither given nor free keeps its initial or nominal value, and is where the search for a free
-    one starts.
+    Damped Newton in scaled variables, at most so many steps; where that leads nowhere, from other
+    starts too, unless a point is wanted to which the start itself leads (``nearby``).  Names are
+    states and commands; what is neither given nor free keeps its initial or nominal value, and is
+    where the search for a free one starts.
 
     Raises
     ------
@@ -69,7 +71,7 @@ def operating_point(
 
     search = _Search(model, columns, rows, size, steps)
     values, left = search.newton(values)
-    if not search.solved(left):
+    if not search.solved(left) and not nearby:
         values, left = search.elsewhere(values, left, names)
     if not search.solved(left):
         at = listed([f"{name} {value:.4g}" for name, value in given.items()]) or "any state"
@@ -138,12 +140,15 @@ class _Search:
         """The same within the ranges of the free values, by a trust region from inside; the best.
 
         A spool that has shut leaves Newton nothing to go by, and a supply of another pressure
-        brings it there from a start that served the usual one.
+        brings it there from a start that served the usual one.  Values stay where they are if one
+        has no range, as a pressure where the supply's is the ambient one.
 
         Source: Branch, Coleman and Li 1999, as in SciPy's ``least_squares``.
         """
         ends = [_ends(self.model, names[k], values[k]) for k in self.columns]
         low, high = np.array(ends).T / self.size
+        if not np.less(low, high).all():
+            return values, left
 
         def at(scaled: np.ndarray) -> np.ndarray:
             trial = values.copy()

@@ -198,11 +198,13 @@ def design_model(plant: Plant) -> DesignModel:
 def closed_command(plant: Plant, name: str | None = None) -> float:
     """Value of a command, the first unless named, at which its valve stands at its centre.
 
-    That is the centre of the valve itself, the nominal command where it has none, and the offset.
+    That is the centre of the valve itself, the nominal command where it has none, and the offset,
+    which some valves hold themselves.
     """
     signal = next(s for s in plant.commands if name in (None, s.name))
     valve = next((e for e in plant.effects if e.name == signal.name.partition(".")[0]), None)
-    return float(getattr(valve, "centre_v", signal.nominal)) + offset(plant, signal.name)
+    centre = getattr(valve, "centre_v", signal.nominal) + getattr(valve, "offset_share", 0.0)
+    return float(centre) + offset(plant, signal.name)
 
 
 def offset(plant: Plant, name: str) -> float:

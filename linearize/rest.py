@@ -29,8 +29,9 @@ def rest_of(hybrid: HybridModel, mode: Mode) -> Rest | None:
     """The equilibrium under a mode's own command, or none where its region has none.
 
     A rest that static friction does not carry is none.  The search is that of
-    :func:`linearize.equilibrium.operating_point`, from the mode's point on, in all states that the
-    mode keeps.  A position whose rate is a velocity that is not held may go on: a steady slide.
+    :func:`linearize.equilibrium.operating_point`, from the mode's point on and nowhere else, in all
+    states that the mode keeps.  A position whose rate is a velocity that is not held may go on: a
+    steady slide.
     """
     held = [name for region in mode.box.values() for name in region.holds]
     model, point = hybrid.model.holding(held), whole_point(hybrid, mode)
@@ -39,7 +40,8 @@ def rest_of(hybrid: HybridModel, mode: Mode) -> Rest | None:
     sliding = {model.states[k] for k in range(n) if np.count_nonzero(A[k]) == 1 and 1.0 in A[k]}
     free = tuple(name for name in mode.state_names if name not in sliding)
     try:
-        found = operating_point(model, dict(zip(names, point, strict=True)), free, free, STEPS)
+        at_point = dict(zip(names, point, strict=True))
+        found = operating_point(model, at_point, free, free, STEPS, nearby=True)
     except ValueError:
         return None
     at = dict(zip(names, (*found.state, *found.command), strict=True))

@@ -14,11 +14,12 @@ from linearize.standard import POSITION, PRESSURES, SUPPLY
 from studies.scenarios import LATE_S, SAMPLE_TIME_S, Scenario
 from studies.text import clock, columns, until
 from workbench.closed_loop import LoopRecord
+from workbench.effects.valve_command import DeadZone
 from workbench.plant import Plant
 
 SETTLED_M, GOAL_CYCLE_M = 0.2e-3, 0.1e-3
 LOST_SHARE = 0.1  # of the amplitude: a reference that is followed worse than this is lost
-DEAD_ZONE, OVERLAP = "valve_dead_zone.half_width_v", "valve.overlap_share"
+OVERLAP = "valve.overlap_share"
 MARGIN_M, LOWEST_PA, BELOW_SUPPLY_PA = 2e-3, 1.2e5, 5e3
 
 
@@ -153,10 +154,19 @@ def valve_switches(plant: Plant, command_v: np.ndarray, name: str | None = None)
     A command within the dead zone opens neither side, and counts as none; ``command_v``, that of
     ``name`` or of the only valve, is (n,).
     """
-    opening_v = command_v - closed_command(plant, name)
-    half_v = plant.values.get(DEAD_ZONE, plant.values.get(OVERLAP, 0.0))
+    centre_v, half_v = _shut(plant, name or plant.commands[0].name)
+    opening_v = command_v - centre_v
     sides = np.sign(opening_v[np.abs(opening_v) > half_v])
     return float(np.count_nonzero(np.diff(sides)))
+
+
+def _shut(plant: Plant, name: str) -> tuple[float, float]:
+    """Centre and half width of the commands under which a valve opens neither side."""
+    centre_v = closed_command(plant, name)
+    for effect in plant.effects:
+        if isinstance(effect, DeadZone) and effect.signal == name:
+            return centre_v + float(effect.shift_v), float(effect.half_width_v)
+    return centre_v, float(plant.values.get(OVERLAP, 0.0))
 
 
 def air_used_kg(plant: Plant, record: LoopRecord, sample_time_s: float = SAMPLE_TIME_S) -> float:

@@ -42,9 +42,11 @@ class DesignReport:
 
 def design_report(found: Design, say: Callable[[str], None]) -> DesignReport:
     """Margins and certificates of all axes of a design; ``say`` is told what is looked for."""
+    from controllers.nonlinear_mpc import NonlinearMpc
+
     made = found.controller
     parts = getattr(made, "regulators", (made,) if hasattr(made, "laws") else ())
-    if found.method == "hybrid-mpc":
+    if isinstance(made, NonlinearMpc):  # the laws that it inherits are those of linear MPC
         parts = ()
     return DesignReport(found, tuple(_of_parts(found, parts, say)))
 

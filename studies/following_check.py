@@ -15,7 +15,7 @@ from estimators.raw import RawMeasurement
 from estimators.scheduled_kalman import ScheduledKalman
 from studies.closed_loop_check import every_loop
 from studies.closed_loop_metrics import air_used_kg, rise_s, step_figures, valve_switches
-from studies.following import BAND, BENCHES, WITHIN, Task, leg_of
+from studies.following import BAND, BENCHES, TICK_S, WITHIN, Task, leg_of
 from studies.tables import NEVER
 from studies.text import clock, columns, number, shown
 from workbench.closed_loop import Hardware, LoopRecord, close_loop
@@ -214,7 +214,7 @@ def _foot(plant: Plant, record: LoopRecord, task: Task, controller_s: float) -> 
 
 
 def _errors(error: np.ndarray, task: Task, unit: str) -> dict[str, float]:
-    judged = error[round(task.judged_s / 1e-3) :]
+    judged = error[round(task.judged_s / TICK_S) :]
     rmse = float(np.sqrt(np.mean(judged**2)))
     return {f"rmse_{unit}": rmse, f"largest_error_{unit}": float(judged.max())}
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import inf, log, pi, tau
+from math import inf, log, tau
 
 import numpy as np
 
@@ -32,6 +32,9 @@ class Growth:
     @property
     def words(self) -> str:
         """In one clause."""
+        turns = self.swings_hz * SLOW_S >= 1.0  # a slower swing is seen as a drift
+        if self.grows_s > SLOW_S and turns:
+            return f"an oscillation of {number(self.swings_hz, 3)} Hz hardly grows, {self._in_time}"
         if self.grows_s > SLOW_S:
             return f"it drifts, nothing brings it back in time ({self._in_time})"
         if self.swings_hz == 0.0:
@@ -41,7 +44,7 @@ class Growth:
     @property
     def _in_time(self) -> str:
         if self.grows_s == inf:
-            return "a pole at one"
+            return "poles of size one" if self.swings_hz else "a pole at one"
         return f"by e in {number(self.grows_s, 3)} s"
 
 
@@ -54,7 +57,7 @@ def growth_of(closed: np.ndarray, sample_time_s: float) -> Growth | None:
     per_sample = log(abs(pole))
     grows_s = sample_time_s / per_sample if per_sample > 0.0 else inf
     turn = abs(float(np.angle(pole)))  # pi for a pole that changes its sign with every sample
-    return Growth(grows_s, min(turn, pi) / (tau * sample_time_s))
+    return Growth(grows_s, turn / (tau * sample_time_s))
 
 
 def unstable_text(growth: Mapping[str, Growth]) -> str:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from controllers import CONTROLLERS
+from controllers.condensed import MpcSpec
 from controllers.spec import replaced
 from linearize.axes import stroke_m
 from linearize.standard import POSITION, PRESSURES, SHIFT_MODES, SLIDE_MODES, SUPPLY
@@ -160,7 +161,7 @@ def design_numbers(spec: Specification, method: str, plant: Plant) -> dict[str, 
     The MPC keeps one margin to both ends and one pair of limits for both pressures: the tightest.
     """
     own = dict(spec.numbers.get(method, {}))
-    if method != "mpc":
+    if method not in CONTROLLERS or CONTROLLERS[method].spec is not MpcSpec:
         return own
     numbers: dict[str, float] = {}
     limits = {each.figure: each for each in spec.asked if isinstance(each, Limit)}

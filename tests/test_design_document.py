@@ -9,9 +9,11 @@ from commands import call
 from controllers.design_file import design
 from studies.design_document import design_document
 from studies.design_report import design_report
+from studies.design_text import NO_LAWS, design_texts
 from workbench.plants.crr_arm import crr_arm
 from workbench.plants.crr_leg import crr_leg
 from workbench.plants.gearbox import gearbox
+from workbench.plants.servo_drive import servo_drive
 
 
 def document(method, plant, numbers=None):
@@ -51,6 +53,14 @@ def test_of_an_unstable_loop_there_is_what_grows_and_no_margin():
     row = next(row for row in law["margins"] if not row["stable"])
     assert row["grows_s"] > 0.0 and row["phase_deg"] is None and row["distance"] is None
     assert law["certificate"]["unstable"]
+
+
+def test_nonlinear_mpc_has_no_margins_and_says_so():
+    """Those of linear MPC, from which it takes its terminal costs, are not its own."""
+    report = design_report(design("nonlinear-mpc", servo_drive()), lambda said: None)
+
+    assert report.laws == ()
+    assert [*design_texts(report)] == [NO_LAWS]
 
 
 def test_a_leg_has_a_law_for_each_joint_and_hybrid_mpc_none():

@@ -3,7 +3,8 @@
 import pytest
 from commands import call
 
-from controllers.design_file import design, write_design
+from controllers.design_file import design, parse_design, write_design
+from workbench.errors import InputError
 from workbench.plants.servo_drive import servo_drive
 
 
@@ -61,14 +62,60 @@ def test_what_is_wrong_in_a_design_file_is_named_with_its_line(place, old, new, 
     assert first.startswith(f"{place / 'wrong.toml'}:{number}: ")
 
 
+WHOLE = """\
+controller = "{method}"
+[plant]
+name = "{plant}"
+removed = []
+{more}
+[plant.values]
+{values}
+[spec]
+{numbers}
+"""
+
+
+@pytest.mark.parametrize(
+    ("method", "plant", "wrong", "number", "said"),
+    [
+        ("hybrid-mpc", "gearbox", {"numbers": "hold_s = 0.018\nhorizon = 16"}, 9,
+         "hybrid-mpc.hold_s: is 0.018, 18 of 16 samples ahead; expected a pulse that ends within"),
+        ("hybrid-mpc", "gearbox", {"numbers": "hold_s = 0.019\njudged = 400"}, 10,
+         "hybrid-mpc.judged: is 400; expected < "),
+        ("per-mode", "servo_drive", {"numbers": '[spec.modes]\n"charge a slide" = "pid"'}, 10,
+         "per-mode.modes.charge a slide: the modes in which the valve drives the motion have no"),
+        ("per-mode", "servo_drive", {"numbers": '[spec.modes]\na = ["x"]'}, 10,
+         "per-mode.modes.a: is ['x']; expected lq, pid, cascade"),
+        ("lq", "servo_drive", {"values": '"supply.pressure_pa" = 1.1e5'}, 7,
+         "supply.pressure: 1.1 bar is too low to move: "),
+        ("mpc", "servo_drive", {"numbers": "margin_m = 3.0"}, 8, "mpc: margin_m 3, lowest_pa"),
+        ("nonlinear-mpc", "servo_drive", {"numbers": "margin_m = 3.0"}, 8,
+         "nonlinear-mpc: margin_m 3, lowest_pa"),
+        ("lq", "servo_drive", {"more": 'laws = ["law[v|w|]@slide"]'}, 5,
+         "law[v|w|]@slide: servo_drive has no such name; expected one of law["),
+    ],
+)  # fmt: skip
+def test_what_the_plant_and_the_method_refuse_is_named_with_its_line(
+    tmp_path, method, plant, wrong, number, said
+):
+    parts = dict.fromkeys(("more", "values", "numbers"), "") | wrong
+    path = tmp_path / "design.toml"
+    with pytest.raises(InputError) as refusal:
+        parse_design(WHOLE.format(method=method, plant=plant, **parts), path)
+
+    assert str(refusal.value).startswith(f"{path}:{number}: {said}")
+
+
 @pytest.mark.parametrize(
     ("content", "said"),
     [
+        ('controller = "lq"\n[plant]\n[spec]\n',
+         "wrong.toml:2: name: is missing; expected the name of a plant"),
         (b"\xff\xfe\x00\x01", "wrong.toml: cannot be read: 'utf-8' codec can't decode"),
         ("controller = ", "wrong.toml:1: Invalid value (at end of document); exp"),
         ('controller = "lq"\n', "wrong.toml: spec: is missing; expected a table of the contr"),
         ("plant = 3\n", "wrong.toml:1: plant: 3 is of the wrong type; expected a table with"),
     ],
-)
+)  # fmt: skip
 def test_what_is_no_design_file_at_all_is_named(place, content, said):
     assert said in refused(place, content)

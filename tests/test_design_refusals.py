@@ -4,6 +4,7 @@ import pytest
 from commands import call
 
 from linearize.standard import SLIDE_MODES, slide_modes
+from workbench.errors import InputError
 from workbench.plants.servo_drive import servo_drive
 
 
@@ -71,6 +72,14 @@ def test_a_supply_that_moves_nothing_is_said_to_be_too_low(tmp_path, plant, comm
     assert answer.exit_code == 2
     assert line.startswith("workbench: supply.pressure: 1.1 bar is too low to move: ")
     assert line.endswith(f"; expected more, as {enough} bar")
+
+
+@pytest.mark.parametrize("supply_bar", [1.0, 1.01])
+def test_a_supply_at_ambient_pressure_is_refused_in_words_of_the_project(supply_bar):
+    plant = servo_drive()
+    values = {"supply.pressure_pa": supply_bar * 1e5, "atmosphere.pressure_pa": supply_bar * 1e5}
+    with pytest.raises(InputError, match="too low to move: servo_drive: no operating point at "):
+        slide_modes(plant.with_values(values))
 
 
 def test_a_point_that_is_missing_for_another_reason_is_not_blamed_on_the_supply(monkeypatch):

@@ -238,7 +238,7 @@ def test_a_plant_without_switching_valves_is_refused():
 
 
 def test_more_to_judge_than_there_is_is_refused():
-    with pytest.raises(InputError, match=r"hybrid-mpc\.judged is"):
+    with pytest.raises(InputError, match=r"hybrid-mpc\.judged: is 400"):
         design("hybrid-mpc", gearbox(), {"judged": 400, "hold_s": 1.9e-2})
 
 

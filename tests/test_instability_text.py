@@ -23,6 +23,8 @@ def grown(factor, turn=0.0 * TURN):
         (grown(1.02), "it runs away without oscillating, by e in 0.101 s"),
         (grown(-1.02), "an oscillation of 250 Hz grows"),
         (grown(1.0), "it drifts, nothing brings it back in time (a pole at one)"),
+        (grown(-1.0), "an oscillation of 250 Hz hardly grows, poles of size one"),
+        (grown(1.00007, TURN), "an oscillation of 19.9 Hz hardly grows, by e in 28.6 s"),
         (grown(1.00007, 1e-3 * TURN), "it drifts, nothing brings it back in time (by e in 28.6 s)"),
     ],
 )

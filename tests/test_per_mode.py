@@ -84,9 +84,10 @@ def test_a_design_by_mode_is_a_file_that_builds_it_again(mixed, tmp_path):
 @pytest.mark.parametrize(
     ("modes", "said"),
     [
-        ({"charge a slide + midle": "pid"}, "did you mean charge a slide"),
-        ({"closed slide + middle": "pid"}, "the valve drives the motion has no closed slide"),
+        ({"charge a slide + midle": "pid"}, "did you mean 'charge a slide"),
+        ({"closed slide + middle": "pid"}, "closed slide .* the valve drives the motion have no"),
         ({"charge a slide + middle": "pit"}, "is 'pit'"),
+        ({"charge a slide + middle": ["pid"]}, "is \\['pid'\\]; expected lq, pid, cascade"),
         ("pid", "no table"),
     ],
 )

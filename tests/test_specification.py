@@ -233,16 +233,17 @@ def test_a_file_of_another_shape_is_refused_with_its_line(text, expected):
     assert line.startswith(expected)
 
 
-def test_the_limits_of_a_specification_are_those_of_the_mpc_unless_its_table_has_its_own():
+@pytest.mark.parametrize("method", ["mpc", "nonlinear-mpc"])
+def test_the_limits_of_a_specification_are_those_of_an_mpc_unless_its_table_has_its_own(method):
     """One margin to both ends and one pair for both pressures: the tightest."""
     stroke_mm = 1e3 * stroke_m(DRIVE.plant)
     spec = read_specification(
         f'[limits]\nslide.position = ["5 mm", "{stroke_mm - 9} mm"]\n'
         'chamber_a.pressure = ["1.5 bar", "6 bar"]\nchamber_b.pressure = "5 bar"\n'
-        "[mpc]\nlowest_pa = 1.1e5\nhorizon = 30\n",
+        f"[{method}]\nlowest_pa = 1.1e5\nhorizon = 30\n",
         DRIVE,
     )
-    numbers = design_numbers(spec, "mpc", DRIVE.plant)
+    numbers = design_numbers(spec, method, DRIVE.plant)
 
     assert numbers == {
         "margin_m": pytest.approx(9e-3),
@@ -252,7 +253,7 @@ def test_the_limits_of_a_specification_are_those_of_the_mpc_unless_its_table_has
     }
     assert set(numbers) <= set(vars(MpcSpec()))
     assert design_numbers(spec, "lq", DRIVE.plant) == {}
-    assert design_numbers(Specification(()), "mpc", DRIVE.plant) == {}
+    assert design_numbers(Specification(()), method, DRIVE.plant) == {}
 
 
 def test_over_several_plants_a_line_has_its_share_and_its_worst_with_what_it_drew():

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from controllers.design_file import design
+from linearize.reduction import closed_command
 from studies.closed_loop_metrics import valve_switches
 from studies.followers import _claimed
 from studies.following import BENCHES
@@ -14,9 +15,11 @@ from studies.specification import read_specification
 from studies.verdicts import figures_of
 from workbench.errors import InputError
 from workbench.plants import PLANTS
+from workbench.plants.soft_joint import OVERLAP
 from workbench.rig import default_rig
 
 STEP = 'rise_time = "1 s"\novershoot = "5 %"\nswitches = 500\nair = "9 g"\n'
+SIDES = np.tile([1.0, -1.0], 5)
 LENGTHS = {"crr_rig": "1 mm", "crr_arm": "1 deg", "soft_joint": "0.1 bar"}
 
 
@@ -84,3 +87,31 @@ def test_each_valve_of_the_leg_counts_about_its_own_centre():
 
     assert valve_switches(plant, command, "valve_1.command_v") == 4.0
     assert valve_switches(plant, command, "valve_2.command_v") == 2.0
+
+
+@pytest.mark.parametrize("valve", ["valve_1", "valve_2", "valve_3"])
+def test_commands_within_the_dead_zone_of_a_valve_of_the_leg_are_no_switches(valve):
+    name = f"{valve}.command_v"
+    plant = PLANTS["crr_leg"]().with_values({f"valve_dead_zone@{valve}.half_width_v": 0.5})
+    inside, outside = (closed_command(plant, name) + v * SIDES for v in (0.4, 0.6))
+
+    assert valve_switches(plant, inside, name) == 0.0
+    assert valve_switches(plant, outside, name) == len(SIDES) - 1
+
+
+def test_a_dead_zone_beside_the_centre_of_its_valve_counts_where_it_lies():
+    values = {"valve_dead_zone.half_width_v": 0.5, "valve_dead_zone.centre_v": 5.2}
+    plant = PLANTS["crr_arm"]().with_values(values)
+    centre_v = closed_command(plant) + 0.2
+
+    assert valve_switches(plant, centre_v + 0.4 * SIDES) == 0.0
+    assert valve_switches(plant, centre_v + 0.6 * SIDES) == len(SIDES) - 1
+
+
+@pytest.mark.parametrize("offset", [-0.1, 0.0, 0.1])
+def test_the_overlap_of_the_soft_joint_lies_about_its_offset(offset):
+    plant = PLANTS["soft_joint"]().with_values({"valve.offset_share": offset})
+
+    assert closed_command(plant) == pytest.approx(0.5 + offset)
+    assert valve_switches(plant, 0.5 + offset + 0.9 * OVERLAP * SIDES) == 0.0
+    assert valve_switches(plant, 0.5 + offset + 1.1 * OVERLAP * SIDES) == len(SIDES) - 1
