@@ -2,10 +2,11 @@
 
 A fit asks for a few hundred windows of a plant with a few dozen sets of values.  Beside CasADi's
 own map lanes are 2.4 to 2.9 times as fast on a processor with eight of them (``pytest
-tests/benchmarks/test_speed_of_ensemble.py -s --benchmark-enable``).  A step whose error does not pass is refined as deep as
-:mod:`workbench.rosenbrock` goes, by its own lane: each is at its own sample and its own step of it,
-all try theirs in one call, and a lane whose run is at its end takes the next, so that none waits
-for another.  Every lane gives what :meth:`workbench.model.Model.run` gives, to the last bit.
+tests/benchmarks/test_speed_of_ensemble.py -s --benchmark-enable``).  A step whose error does not
+pass is refined as deep as :mod:`workbench.rosenbrock` goes, by its own lane: each is at its own
+sample and its own step of it, all try theirs in one call, and a lane whose run is at its end takes
+the next, so that none waits for another.  Every lane gives what :meth:`workbench.model.Model.run`
+gives, to the last bit.
 """
 
 from __future__ import annotations
