@@ -21,6 +21,7 @@ import numpy as np
 
 from controllers.axis import Axis
 from controllers.margins import Law, both_ways_s, unforeseen_s
+from controllers.on_measurement import OnMeasurement
 from controllers.scheduled import Schedule, driven_modes
 from linearize.discrete import sampled
 from linearize.modes import HybridModel, Mode
@@ -49,9 +50,9 @@ class Delays:
 
 
 def delays_of(plant: Plant, law: Controller) -> Delays:
-    """Those that a law meets: on the raw measurement, as one with a ``signal`` is, all of both."""
+    """Those that a law is designed for: one on the measurement itself meets all of both."""
     sensors_s = unforeseen_s(plant)
-    return Delays(sensors_s, both_ways_s(plant) - sensors_s, not hasattr(law, "signal"))
+    return Delays(sensors_s, both_ways_s(plant) - sensors_s, not isinstance(law, OnMeasurement))
 
 
 def foreseeing(

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from controllers.on_measurement import OnMeasurement
 from controllers.positioning import STATES
 from workbench.contracts import Controller
 from workbench.units import public_name, si_unit
@@ -65,8 +66,7 @@ def _states(part: Any) -> tuple[str, ...]:
     """What is fed back, the position first."""
     if axis := getattr(part, "axis", None):
         return axis.states
-    signal = getattr(part, "signal", "")
-    return (signal,) if signal else STATES
+    return (part.signal,) if isinstance(part, OnMeasurement) else STATES
 
 
 def _of_axis(schedule: Any, states: tuple[str, ...], body: str) -> Iterator[GainRow]:

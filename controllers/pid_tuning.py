@@ -79,7 +79,7 @@ class PidParts:
     standing_per_s: float = 5.0
     limits: MotionLimits = MotionLimits()
     dither: Dither = Dither()
-    tracking_time_s: float = 0.05
+    tracking_time_s: float = 0.0
     smooth_v: float = 0.01
     sample_time_s: float = 1e-3
 
@@ -195,6 +195,8 @@ def _at_bandwidth(
     mode: Mode, spec: TuningSpec, parts: PidParts, delay_s: float, bandwidth_hz: float
 ) -> PidGains | None:
     w, dt = tau * bandwidth_hz, parts.sample_time_s
+    if bandwidth_hz >= 0.5 / dt:
+        return None  # samples show it as a lower frequency
     z, integral_time_s = np.exp(1j * w * dt), spec.integral_periods / w
     A, B, C, D = parts.derivative.filter(dt)
     slope = C @ np.linalg.solve(z * np.eye(len(A)) - A, B) + D

@@ -5,7 +5,8 @@
 
 The integral is kept in volts.  Where the gains change with the mode, it takes over what P and D
 lose or gain by that, so that the opening does not jump (bumpless transfer).  Where the valve is at
-its limit, it follows what was sent (back-calculation).
+its limit, it follows what was sent (back-calculation), within T_i = K_p / K_i by default: in a
+shorter time a large step drives it against the error, and it needs T_i to come back.
 
 The opening of the wanted motion comes from the modes and builds the pressures that belong to it:
 those against dry friction and gravity in that direction (friction compensation), and those of speed
@@ -26,6 +27,7 @@ from controllers.charging import Charging, charging_mixed
 from controllers.derivative import Derivative, Filter, LowPassDerivative, settled
 from controllers.margins import Law
 from controllers.motion import PREVIEW, MotionLimits, Sliding, motion
+from controllers.on_measurement import OnMeasurement
 from controllers.scheduled import Schedule
 from controllers.spec import ranged
 from controllers.through_valve import ThroughValve
@@ -100,16 +102,18 @@ class PidMemory:
 
 
 @dataclass(frozen=True, kw_only=True)
-class TwoDegreePid:
-    """See the module; ``signal`` names the measured position."""
+class TwoDegreePid(OnMeasurement):
+    """See the module; ``signal`` names the measured position.
 
-    signal: str
+    A ``tracking_time_s`` of 0 is the integral time of the gains.
+    """
+
     gains: Schedule[PidGains]
     valve: ThroughValve
     feedforward: Feedforward
     derivative: Derivative = LowPassDerivative(3e-3)
     dither: Dither = Dither()
-    tracking_time_s: float = 0.05
+    tracking_time_s: float = 0.0
     sample_time_s: float = 1e-3
     preview: int = PREVIEW
 
@@ -142,10 +146,18 @@ class TwoDegreePid:
         sent_ahead, pressures = self._ahead_v(float(reference[0, 0]), ahead, moving, memory)
         wanted = direct + integral + sent_ahead
         opening = float(np.clip(wanted, *self.valve.openings_v))
-        integral += dt / self.tracking_time_s * (opening - wanted)
+        integral += self._share_followed(now) * (opening - wanted)
         sent = self.valve.sent(opening + self.dither.at(memory.samples * dt), estimate)
         kept = PidMemory(integral, A @ memory.slopes + B * y, now, memory.samples + 1, pressures)
         return Command(sent, kept, {"opening_v": opening, "integral_v": integral})
+
+    def _share_followed(self, gains: PidGains) -> float:
+        """Of what was cut off, in one sample; none where no integral gain could undo it."""
+        if not gains.integral:
+            return 0.0
+        dt = self.sample_time_s
+        within = self.tracking_time_s or gains.proportional / gains.integral
+        return dt / max(within, dt)
 
     def _ahead(self, speed: float, error: float) -> float:
         given = self.feedforward
@@ -186,11 +198,17 @@ def mixed(schedule: Schedule[PidGains], place: float, ahead: float) -> PidGains:
 
 
 def law_of(gains: PidGains, slopes: Filter, sample_time_s: float) -> Law:
-    """From the states of an axis, position first, to the opening; its memory ends with I / K_i."""
+    """From the states of an axis, position first, to the opening; its memory ends with I / K_i.
+
+    Without an integral gain it has none: it would stand as a pole at one that nothing sees.
+    """
     A, B, C, D = slopes
-    n, place = len(A), np.array([1.0, 0.0, 0.0, 0.0])
-    kept = np.zeros((n + 1, n + 1))
-    kept[:n, :n], kept[n, n] = A, 1.0
-    moved = np.outer([*B, sample_time_s], place)
+    place = np.array([1.0, 0.0, 0.0, 0.0])
+    kept, moved, seen = A, np.outer(B, place), gains.derivative * C
+    if gains.integral:
+        n = len(A)
+        kept = np.block([[A, np.zeros((n, 1))], [np.zeros((1, n)), np.ones((1, 1))]])
+        moved = np.vstack([moved, sample_time_s * place])
+        seen = np.array([*seen, gains.integral])
     direct = gains.proportional + gains.derivative * D + gains.integral * sample_time_s
-    return Law(kept, moved, -np.array([*(gains.derivative * C), gains.integral]), -direct * place)
+    return Law(kept, moved, -seen, -direct * place)

@@ -8,6 +8,9 @@ import numpy as np
 
 from workbench.contracts import Estimate
 
+RAW = "raw"
+"""Its name among those of estimators."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class RawMeasurement:

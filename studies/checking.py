@@ -12,8 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from controllers.design_file import parse_design
+from controllers.on_measurement import OnMeasurement
 from estimators import ESTIMATORS
 from estimators.per_mode import names_of
+from estimators.raw import RAW
 from linearize.standard import SHIFT_MODES, SLIDE_MODES
 from studies.closed_loop_check import Check, check
 from studies.closed_loop_figures import check_figures
@@ -21,7 +23,7 @@ from studies.figures.following import following_figures
 from studies.figures.shifts import shift_figures
 from studies.figures.style import styled
 from studies.following import BENCHES
-from studies.following_check import RAW, FollowingCheck, check_followed, tasks_of
+from studies.following_check import FollowingCheck, check_followed, tasks_of
 from studies.sample_times import require_multiple
 from studies.scenarios import SCENARIOS
 from studies.shift_check import SHIFTS, ShiftCheck, check_shifts
@@ -117,8 +119,9 @@ def loops_of(
     Raises
     ------
     InputError
-        If a scenario or an estimator does not exist, the plant has no standard modes or brings its
-        own estimator, or a design is for another plant.
+        If a scenario or an estimator does not exist, `raw` is for a law that needs more than is
+        measured, the plant has no standard modes or brings its own estimator, or a design is for
+        another plant.
     """
     name, wanted = rig.plant.name, tuple(estimators)
     known = (*SLIDE_MODES, *SHIFT_MODES, *BENCHES)
@@ -131,13 +134,14 @@ def loops_of(
     there = scenarios_of(rig.plant)
     chosen = tuple(scenarios) or there
     require(chosen, there, "the list of scenarios")
+    controllers = _controllers(rig, designs)
     if name not in SHIFT_MODES:
         wanted = wanted or (USUAL,)
         named = [one for choice in wanted for one in names_of(choice)]
-        require(
-            named, (*ESTIMATORS, *((RAW,) if name in BENCHES else ())), "the list of estimators"
-        )
-    return Loops(rig, _controllers(rig, designs), wanted, chosen)
+        measured = all(isinstance(law, OnMeasurement) for law in controllers.values())
+        raw = (RAW,) if measured or name in BENCHES else ()
+        require(named, (*ESTIMATORS, *raw), "the list of estimators")
+    return Loops(rig, controllers, wanted, chosen)
 
 
 def _controllers(rig: Rig, designs: Mapping[Path, str]) -> dict[str, Controller]:

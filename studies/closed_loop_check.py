@@ -12,6 +12,7 @@ import numpy as np
 from estimators import ESTIMATORS
 from estimators.ahead import in_time
 from estimators.per_mode import chosen_per_mode
+from estimators.raw import RAW, RawMeasurement
 from estimators.scheduled_kalman import ScheduledKalman, noise_for
 from linearize.axes import stroke_m
 from linearize.standard import POSITION, PRESSURES, VELOCITY
@@ -62,7 +63,7 @@ def sensors(plant: Plant) -> Hardware:
 
 @lru_cache(maxsize=8)
 def standard_estimator(name: str, plant: Plant, sample_time_s: float) -> Estimator:
-    """An estimator of the registry for the sensors and the usual process noise, made once.
+    """An estimator of the registry for the sensors and the usual process noise; `raw` is none.
 
     ``name`` may also choose by mode, see :mod:`estimators.per_mode`.
 
@@ -71,6 +72,8 @@ def standard_estimator(name: str, plant: Plant, sample_time_s: float) -> Estimat
     UnknownNameError
         If there is no such estimator, or no such mode.
     """
+    if name == RAW:
+        return RawMeasurement(names=plant.measured, sample_time_s=sample_time_s)
     hardware, lean = sensors(plant), plant.lean()
     coarse = {key: grid / 12**0.5 for key, grid in hardware.resolution.items()}
     noise = {key: float(np.hypot(s, coarse.get(key, 0.0))) for key, s in hardware.noise.items()}

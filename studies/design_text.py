@@ -35,7 +35,9 @@ NO_LAWS = (
     "says what the whole plant makes of it"
 )
 ALL_STATES = "all states are taken as known, no estimator is in the loop"
-MEASURED = "the law acts on the measurement itself and foresees nothing"
+MEASURED = (
+    "the law acts on the measurement itself and foresees nothing, as under `check --estimator raw`"
+)
 FORESEEN = "foreseen by each mode as by the estimators of `check` (the certificate: exactly)"
 DRY = "margins of linear modes say nothing of dry friction: `workbench check` is what counts"
 

@@ -11,7 +11,7 @@ import numpy as np
 from estimators import ESTIMATORS
 from estimators.ahead import in_time
 from estimators.per_mode import chosen_per_mode
-from estimators.raw import RawMeasurement
+from estimators.raw import RAW, RawMeasurement
 from estimators.scheduled_kalman import ScheduledKalman
 from studies.closed_loop_check import every_loop
 from studies.closed_loop_metrics import air_used_kg, rise_s, step_figures, valve_switches
@@ -24,7 +24,6 @@ from workbench.filtering import consistent_start
 from workbench.plant import Plant, require
 from workbench.units import suffix
 
-RAW = "raw"
 SLOWER, AT_LEAST = 0.2, 3  # share of the open valve's time, and samples of the controller
 LATE_S = 0.1  # the end of a step, where its final error is
 

@@ -4,15 +4,18 @@ import numpy as np
 import pytest
 from commands import call
 
-from controllers.design_file import design
+from controllers.design_file import design, write_design
 from controllers.foresight import delays_of, foresighted
 from controllers.margins import both_ways_s, closed, margins, margins_of
 from controllers.scheduled import driven_modes
+from studies.checking import loops_of
 from studies.design_report import design_report
 from studies.design_text import design_texts
 from studies.text import number
+from workbench.errors import InputError
 from workbench.plants.crr_rig import crr_rig
 from workbench.plants.servo_drive import servo_drive
+from workbench.rig import default_rig
 
 DT = 2e-3
 NEAR = (2e-3, 4e-3)  # about the margin of delay
@@ -72,7 +75,8 @@ def test_less_than_half_a_sample_is_not_foreseen_as_the_estimators_do_not(mode, 
         (
             'plant = "crr_rig"\n',
             "axis-pid",
-            "with 1 ms of the sensors and 1 ms of the commands; the law acts on",
+            "with 1 ms of the sensors and 1 ms of the commands; the law acts on the measurement "
+            "itself and foresees nothing, as under `check --estimator raw`",
         ),
         ('plant = "servo_drive"\n', "lq", "without delays; all states are taken as known"),
     ],
@@ -84,6 +88,21 @@ def test_design_says_which_delays_its_margins_are_for(tmp_path, rig, method, wor
 
     assert answer.exit_code == 0, answer.output
     assert words in answer.stdout
+
+
+def test_only_a_law_on_the_measurement_is_checked_on_a_drive_without_an_estimator(tmp_path):
+    """`raw` is what its margins are for; an LQ feeds back what a drive does not measure."""
+    plant, texts = servo_drive(), {}
+    for method in ("axis-pid", "lq"):
+        write_design(design(method, plant), path := tmp_path / f"{method}.toml")
+        texts[path] = path.read_text()
+    pid, lq = ({path: text} for path, text in texts.items())
+    loops = loops_of(default_rig(plant), pid, ["raw"], ["step"])
+
+    assert loops.once(plant, 0).rows[0].final_error_m < 0.5e-3
+    for designs in (lq, texts):
+        with pytest.raises(InputError, match="raw"):
+            loops_of(default_rig(plant), designs, ["raw"], ["step"])
 
 
 def test_a_law_on_the_measurement_has_the_margins_that_it_was_tuned_for():

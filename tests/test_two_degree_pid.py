@@ -118,6 +118,27 @@ def test_the_integral_follows_the_limit_and_comes_off_it_at_once(rig):
     assert kept[-1] < 2.0
 
 
+def test_a_large_step_does_not_drive_the_integral_against_its_error(rig):
+    """11 V are asked for; within 50 ms it fell to -1.8 V, and came back at 1.27 s."""
+    gains = PidGains(proportional=220.0, integral=173.0, derivative=0.0)
+    usual, short = pid_with(rig, gains), pid_with(rig, gains, PidParts(tracking_time_s=0.05))
+    path = [0.05] * 50 + [0.0995] * 5
+    kept, driven = (steps(pid, 0.1, path)[0] for pid in (usual, short))
+
+    assert kept[0] == usual.valve.openings_v[1]
+    assert kept[-1] > 220.0 * 0.5e-3 > 0.0 > driven[-1]
+
+
+def test_without_an_integral_gain_nothing_is_left_of_a_limit(rig):
+    """It had kept a bias for ever, since no error could take it away."""
+    gains = PidGains(proportional=250.0, integral=0.0, derivative=8.0)
+    pid = pid_with(rig, gains, PidParts(tracking_time_s=0.05))
+    openings, _ = steps(pid, 0.1, [0.05] * 50 + [0.099] * 200)
+
+    assert openings[0] == pid.valve.openings_v[1]
+    assert openings[-1] == pytest.approx(250.0 * 1e-3)
+
+
 def test_the_dead_zone_is_jumped_and_dither_goes_around_the_opening(drive):
     gains = PidGains(proportional=10.0, integral=0.0, derivative=0.0)
     dither = Dither(amplitude_v=0.3, frequency_hz=50.0)
@@ -145,9 +166,10 @@ def test_friction_is_compensated_towards_the_target(drive):
     assert ahead[0] > 0.0 > back[0] or ahead[0] < 0.0 < back[0]
 
 
+@pytest.mark.parametrize("integral", [5.0, 0.0])
 @pytest.mark.parametrize("derivative", BOTH)
-def test_the_law_of_the_margins_is_the_controller(rig, derivative):
-    gains = PidGains(proportional=20.0, integral=5.0, derivative=0.7)
+def test_the_law_of_the_margins_is_the_controller(rig, derivative, integral):
+    gains = PidGains(proportional=20.0, integral=integral, derivative=0.7)
     pid = pid_with(rig, gains, PidParts(derivative=derivative))
     moves = 1e-3 * np.random.default_rng(3).standard_normal(8)
     moves[0] = 0.0

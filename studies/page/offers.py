@@ -10,9 +10,9 @@ from controllers.margins import Margins, both_ways_s, margins_of
 from controllers.per_mode import Method, PerModeSpec, per_mode
 from controllers.scheduled import driven_modes
 from estimators import ESTIMATORS
+from estimators.raw import RAW
 from linearize.standard import SHIFT_MODES, SLIDE_MODES, slide_modes
 from studies.following import BENCHES
-from studies.following_check import RAW
 from workbench.plant import Plant
 from workbench.rig import Rig
 from workbench.rig_text import quoted
