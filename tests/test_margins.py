@@ -180,6 +180,9 @@ def test_design_prints_margins_of_every_mode_and_what_is_certified_across_them(t
     answer = call("design", rig, "--controller", name, "-o", tmp_path / "design.toml", "-q")
 
     assert answer.exit_code == 0, answer.output
+    if name == "nonlinear-mpc":  # its law is the model itself, not one for each mode
+        assert "no margins" in answer.stdout and "Lyapunov" not in answer.stdout
+        return
     lines = answer.stdout.splitlines()
     head = next(k for k, line in enumerate(lines) if line.startswith("mode "))
     assert all(word in lines[head] for word in ("gain up to", "phase deg", "delay ms", "distance"))
