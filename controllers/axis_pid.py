@@ -22,7 +22,8 @@ USUAL_HZ, BANDWIDTHS_HZ = 0.7, {"crr_rig": 5.0}
 The weakest mode of an arm allows no more, and on a drive a faster loop breaks away too far from
 stiction: it swings by millimetres about its target.  The light rod of the rig has a stiff and
 well damped spring, allows 6 Hz, and at 5 Hz holds the sines of its bench against dry friction.
-Its step is missed, by 1.6 mm where 1 mm is asked, and so is the arm's, by 7.7 deg where 1 is.
+Its step is missed, by 1.6 mm (2.0 mm behind an EKF) where 1 mm is asked, and so is the arm's, by
+7.7 deg where 1 is.
 """
 
 TRACKING_S = {"crr_arm": 0.05, "servo_drive": 0.05}
@@ -30,8 +31,8 @@ TRACKING_S = {"crr_arm": 0.05, "servo_drive": 0.05}
 
 On these two the valve is at its limit for the one sample in which a reference jumps.  The few
 millivolts that a short time takes from the integral there bring the nominal plants nearer: the
-drive to 0.17 mm instead of 0.76, the arm to 7.7 deg instead of 8.6.  No rule: eight drawn drives
-end 4.9 mm away in the median, and 3.2 mm with the time of the gains.
+drive to 0.17 mm instead of 0.76, the arm to 7.7 deg instead of 8.6.  No rule: eight drives, seven
+of them drawn, end 4.9 mm away in the median, and 3.2 mm with the time of the gains.
 """
 
 
