@@ -102,15 +102,15 @@ def test_every_operation_is_that_of_casadi_to_the_last_bit(tmp_path):
     np.testing.assert_array_equal(bits(found), bits(expected))
 
 
-def cut(plant, dt, n=5):
+def cut(plant, dt, n=5, length=LENGTH):
     """Windows over a recording of random commands, and random start states for each."""
-    found = drawn(plant, n * LENGTH, seed=5)
+    found = drawn(plant, n * length, seed=5)
     names = (*plant.model.commands, *plant.model.measured_inputs)
     rows = dict(zip(names, np.vstack([found.u, found.d]), strict=True))
-    rows |= {name: np.zeros(n * LENGTH) for name in plant.measured}
+    rows |= {name: np.zeros(n * length) for name in plant.measured}
     noise = dict.fromkeys(plant.measured, 1.0)
-    windows = cut_windows(plant, [Recording("random", dt, rows)], noise, LENGTH * dt)
-    return windows, found.x[:, ::LENGTH]
+    windows = cut_windows(plant, [Recording("random", dt, rows)], noise, length * dt)
+    return windows, found.x[:, ::length]
 
 
 def with_something_missing(plant, most=5):
@@ -186,6 +186,18 @@ def test_a_run_that_is_lost_takes_no_other_with_it(drive):
     lost = np.repeat([False, True, False, False], LENGTH)
     assert np.isnan(after[:, lost]).any() and np.isfinite(after[:, ~lost]).all()
     np.testing.assert_array_equal(after[:, ~lost], whole[:, ~lost])
+
+
+@needs_lanes
+def test_a_run_of_one_sample_is_what_its_start_shows(drive):
+    n = 11
+    at = drawn(drive, n)
+    p = np.tile(at.p[:, None], n)
+
+    found = drive.model.ensemble(DT)(at.x[:, :n], at.u, at.d, p, 2)
+
+    expected = drive.model.h.map(n)(at.x[:, :n], at.u, at.d, p).full()
+    np.testing.assert_array_equal(bits(found), bits(expected))
 
 
 @needs_lanes

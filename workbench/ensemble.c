@@ -71,12 +71,16 @@ static void show(const asked *a, const lane *own) {
   }
 }
 
-/* The next run that nobody has taken; false where there is none. */
+/* The next run that nobody has taken; false where there is none.  One of one sample ends at once. */
 static int next(const asked *a, points *now, int l, lane *own, long long *taken_runs) {
-  own->run = __atomic_fetch_add(taken_runs, 1, __ATOMIC_RELAXED);
-  if (own->run >= a->runs) own->run = -1;
-  if (own->run >= 0) begin(a, now, l, own);
-  return own->run >= 0;
+  for (;;) {
+    own->run = __atomic_fetch_add(taken_runs, 1, __ATOMIC_RELAXED);
+    if (own->run >= a->runs) own->run = -1;
+    if (own->run < 0) return 0;
+    begin(a, now, l, own);
+    if (a->length > 1) return 1;
+    show(a, own);
+  }
 }
 
 int lanes(void) { return LANES; }
@@ -97,12 +101,12 @@ void run(long long runs, long long length, int lanes, const double *x0, const do
   }
   while (busy) {
     m moves = {0};
-    if (length > 1) trial(now.x, now.held, now.h, later, ok);
+    trial(now.x, now.held, now.h, later, ok);
     for (int l = 0; l < LANES; l++)
-      if (own[l].run >= 0 && length > 1 && taken(ok[0][l], &now, l, own + l)) moves[l] = -1;
+      if (own[l].run >= 0 && taken(ok[0][l], &now, l, own + l)) moves[l] = -1;
     for (int i = 0; i < NX; i++) now.x[i] = pick(moves, later[i], now.x[i]);
     for (int l = 0; l < LANES; l++) {
-      if (own[l].run < 0 || (length > 1 && !(moves[l] && ended(&a, &now, l, own + l)))) continue;
+      if (!moves[l] || !ended(&a, &now, l, own + l)) continue;
       show(&a, own + l);
       busy -= !next(&a, &now, l, own + l, taken_runs);
     }

@@ -9,12 +9,10 @@ import time
 
 import numpy as np
 import pytest
-from conftest import drawn
+from test_ensemble import cut
 
-from workbench.fitting.windows import cut_windows
 from workbench.plants.gearbox import gearbox
 from workbench.plants.servo_drive import servo_drive
-from workbench.recording import Recording
 
 DT, LENGTH, WINDOWS, PLANTS = 1e-3, 200, 25, 4
 
@@ -22,13 +20,7 @@ DT, LENGTH, WINDOWS, PLANTS = 1e-3, 200, 25, 4
 @pytest.mark.parametrize("plant", [servo_drive(), gearbox()], ids=lambda plant: plant.name)
 def test_windows_side_by_side(benchmark, plant, monkeypatch):
     lean = plant.lean()
-    found = drawn(lean, WINDOWS * LENGTH, seed=5)
-    names = (*lean.model.commands, *lean.model.measured_inputs)
-    rows = dict(zip(names, np.vstack([found.u, found.d]), strict=True))
-    rows |= {name: np.zeros(WINDOWS * LENGTH) for name in lean.measured}
-    noise = dict.fromkeys(lean.measured, 1.0)
-    windows = cut_windows(lean, [Recording("random", DT, rows)], noise, LENGTH * DT)
-    starts = found.x[:, ::LENGTH]
+    windows, starts = cut(lean, DT, WINDOWS, LENGTH)
 
     def several():
         return windows.simulated([lean] * PLANTS, starts)
