@@ -18,7 +18,7 @@ from workbench.candidate import Candidate
 from workbench.diagnosis.judge import clearly_less, reasons_against, share_removed
 from workbench.diagnosis.law_choice import worth_scanning
 from workbench.diagnosis.law_seed import refitted, seeds
-from workbench.diagnosis.refit import Refit, held_out_drop, refit, sizes
+from workbench.diagnosis.refit import Refit, held_out_drop, refit, refit_shaken, sizes
 from workbench.diagnosis.result import Law, LawTerm, Size, Where
 from workbench.diagnosis.rough import rough_fit
 from workbench.diagnosis.scan import Profile, scan
@@ -133,7 +133,7 @@ def _refitted(problem: Problem, chosen: Sequence[Candidate], to_beat: float) -> 
     profiles = scan(problem.whole, at.windows, at.unknowns, at.point, chosen, at.derivatives)
     if not profiles or profiles[0].drop <= to_beat:
         return None
-    return refit(problem, rough_fit(problem, profiles[0]))
+    return refit_shaken(problem, refit(problem, rough_fit(problem, profiles[0])))
 
 
 def _counted_from(first: Problem, found: Refit) -> Refit:

@@ -18,7 +18,7 @@ import numpy as np
 
 from workbench.candidate import Candidate
 from workbench.diagnosis.dependence import balance_columns
-from workbench.diagnosis.refit import Refit, refit_from
+from workbench.diagnosis.refit import Refit, refit_from, refit_shaken
 from workbench.diagnosis.result import Where
 from workbench.diagnosis.suspects import with_missing_flows
 from workbench.fitting.problem import Problem
@@ -76,4 +76,4 @@ def refitted(problem: Problem, seed: Seed) -> Refit:
     base = problem.base
     starts = (base.unknowns.values(share * base.point.t) for share in (1.0, 0.0))
     fits = [refit_from(before, terms[-1], {**start, **sizes}) for start in starts]
-    return min(fits, key=lambda each: each.fit.cost)
+    return refit_shaken(before, min(fits, key=lambda each: each.fit.cost))

@@ -21,6 +21,7 @@ from workbench.fitting.gauss_newton import Fit, beyond_noise, fit_windows, point
 from workbench.fitting.linearised import Point
 from workbench.fitting.posterior import posterior_deviation
 from workbench.fitting.problem import Problem, misfit
+from workbench.fitting.pulled_in import pulled_in
 from workbench.fitting.shaken import shaken
 from workbench.fitting.start_states import carried
 from workbench.fitting.unknowns import WIDE
@@ -80,8 +81,11 @@ def refit_from(problem: Problem, candidate: Candidate, values: Mapping[str, floa
 
 
 def refit_shaken(problem: Problem, found: Refit) -> Refit:
-    """A refit, or a lower one near it; see :mod:`workbench.fitting.shaken`."""
-    fit = shaken(found.fit, ITERATIONS)
+    """A refit, or a lower one from nearer to the priors, or beside it.
+
+    See :mod:`workbench.fitting.pulled_in` and :mod:`workbench.fitting.shaken`.
+    """
+    fit = shaken(pulled_in(found.fit, ITERATIONS), ITERATIONS)
     return found if fit is found.fit else _refit(problem, found.candidate, fit, tuple(found.size))
 
 
