@@ -17,15 +17,15 @@ import numpy as np
 
 from workbench.fitting.gauss_newton import Fit, fit_windows
 from workbench.fitting.linearised import Point
+from workbench.fitting.problem import FAR
 
-FAR = 3.0  # prior deviations: of some thirty parameters one is as far off in a model that is right
 SHARES = (0.5, 0.0)  # of the way that the nuisances have gone
 
 
 def pulled_in(fit: Fit, iterations: int) -> Fit:
     """The same fit, or a lower one from nearer to the priors; ``iterations`` bound each of the two.
 
-    Where no parameter has gone further than three deviations of its prior the fit stays.
+    Where none has gone further than 1.5 deviations of its prior, none imitates much: the fit stays.
     """
     unknowns, t = fit.unknowns, fit.point.t
     nuisances = unknowns.precision >= 1.0
