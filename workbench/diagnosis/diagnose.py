@@ -15,7 +15,6 @@ from dataclasses import dataclass, replace
 from workbench.comparison.regimes import regime_shares
 from workbench.consistency import trusted
 from workbench.diagnosis.credible import credible
-from workbench.diagnosis.dominance import dominant_first
 from workbench.diagnosis.evidence import WARNINGS, held_out, weighed
 from workbench.diagnosis.judge import (
     CERTAIN_SHARE,
@@ -117,7 +116,7 @@ def diagnose(
     verdict = judged(ranking, law, evidence.strong, far)
     if verdict in NAMING or (ranking and ranking[0].accepted):
         progress("sizes of what is named")
-        ranking = dominant_first(with_settled_sizes(problem, ranking))
+        ranking = with_settled_sizes(problem, ranking)
     best = ranking[0] if verdict in NAMING else None
     if best and best.fit and not best.fit.converged:
         warnings += (f"the refit with {best.candidate.name} did not converge: its size may be off",)

@@ -145,10 +145,10 @@ def tie_group(base: Fit, refits: list[Refit], profiles: dict[str, Profile]) -> l
     a signature in the same direction: then only the nuisances decide between the two, and on the
     held-out recording too, unless one leaves several times as much there, or fails to predict it by
     more than a few of its windows.  Among the tied those that pass every criterion come first,
-    effects before parameters that would lie far off what is known of them, and among these the
-    held-out recording decides where it does so clearly: the one that leaves at least a fifth less
-    of the misfit there leads.  Those that look most like the leader stand next to it: were it
-    wrong, it would stand for one of them.
+    effects before parameters that would lie far off what is known of them, and among these the one
+    leads that removes most as the mean over training and held-out recordings: either alone orders
+    rivals by what its few events happen to show.  Those that look most like the leader stand next
+    to it: were it wrong, it would stand for one of them.
     """
     best = refits[0]
     tied = [best]
@@ -167,9 +167,7 @@ def tie_group(base: Fit, refits: list[Refit], profiles: dict[str, Profile]) -> l
     tied = tied[: max(len(sound), LARGEST_TIE)]
     effects = [each for each in sound if each.candidate.name in profiles] or sound
     may_lead = [each for each in effects if predicts(each)] or effects
-    best, leader = may_lead[0], min(may_lead, key=left_held_out)
-    if not clearly_less(left_held_out(leader), left_held_out(best)):
-        leader = best
+    leader = max(may_lead, key=share_removed)
     others = [each for each in tied if each is not leader]
     others.sort(key=lambda r: (r not in sound, -abs(_alignment_of(leader, r, profiles))))
     return [leader, *others]
