@@ -147,8 +147,9 @@ def tie_group(base: Fit, refits: list[Refit], profiles: dict[str, Profile]) -> l
     more than a few of its windows.  Among the tied those that pass every criterion come first,
     effects before parameters that would lie far off what is known of them, and among these the one
     leads that removes most as the mean over training and held-out recordings: either alone orders
-    rivals by what its few events happen to show.  Those that look most like the leader stand next
-    to it: were it wrong, it would stand for one of them.
+    rivals by what its few events happen to show.  But where one leaves at least a fifth less of
+    the held-out misfit, that recording decides.  Those that look most like the leader stand next to
+    it: were it wrong, it would stand for one of them.
     """
     best = refits[0]
     tied = [best]
@@ -167,7 +168,9 @@ def tie_group(base: Fit, refits: list[Refit], profiles: dict[str, Profile]) -> l
     tied = tied[: max(len(sound), LARGEST_TIE)]
     effects = [each for each in sound if each.candidate.name in profiles] or sound
     may_lead = [each for each in effects if predicts(each)] or effects
-    leader = max(may_lead, key=share_removed)
+    best, leader = max(may_lead, key=share_removed), min(may_lead, key=left_held_out)
+    if not clearly_less(left_held_out(leader), left_held_out(best)):
+        leader = best
     others = [each for each in tied if each is not leader]
     others.sort(key=lambda r: (r not in sound, -abs(_alignment_of(leader, r, profiles))))
     return [leader, *others]
