@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from workbench.consistency import checked
+from workbench.fitting.continued import with_continued_starts
 from workbench.fitting.errors import Errors, errors_of
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.posterior import fitted_rig, posterior_covariance
@@ -94,8 +95,9 @@ def fit(
     progress("fit")
     problem = pose(held, train, validation)
     before = errors_of(*as_it_came(problem.base, problem.base_validation))
-    progress("the same from short windows, if that leads lower")
-    problem = better_from_short_windows(problem, train)
+    progress("the same from short windows and from earlier ones, if that leads lower")
+    problem = better_from_short_windows(with_continued_starts(problem), train)
+    problem = with_continued_starts(problem)
     base = problem.base
     covariance = posterior_covariance(base)
     return FitReport(

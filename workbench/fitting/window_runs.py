@@ -37,6 +37,14 @@ class WindowRuns:
         begun = result(self._begin.map(runs), x0, u[:, first], d[:, first], p)
         return together(begun, u, d, p, THREADS)
 
+    def ends(self, x0: np.ndarray, u: np.ndarray, d: np.ndarray, p: np.ndarray) -> np.ndarray:
+        """States (n_x, runs) one sample after the last; arguments as those of :meth:`outputs`."""
+        first = slice(None, None, self.length)
+        begun = result(self._begin.map(x0.shape[1]), x0, u[:, first], d[:, first], p)
+        run = self.model.run(self.sample_time_s, self.length)
+        later = result(run.map(x0.shape[1], "thread", THREADS), begun, u, d, p)
+        return later[:, self.length - 1 :: self.length]
+
     def _by_casadi(self, runs: int) -> ca.Function:
         """So many runs; built once."""
         if runs not in self._built:

@@ -189,6 +189,11 @@ class Windows:
         ]
         return np.array(found)
 
+    def ends(self, plant: Plant, starts: np.ndarray) -> np.ndarray:
+        """States of a plant one sample after each window, from and in the shape of ``starts``."""
+        u, d = self._inputs(plant)
+        return self._runs.ends(starts, u, d, np.tile(plant.nominal[2][:, None], len(self)))
+
     def residuals(self, plants: Iterable[Plant], starts: np.ndarray) -> np.ndarray:
         """Weighted residuals, measured minus simulated, shape (n_plants, n_y, n_windows, L)."""
         error = np.nan_to_num(self.measured) - self.simulated(plants, starts)

@@ -1,0 +1,99 @@
+"""A way out of wrong start states: a window begins where the one before it ended.
+
+What no sensor shows at the start of a window is guessed: armatures at rest, no current, no speed
+of a mass behind a joint.  A window that begins while a valve switches is then up to a hundred
+samples off in its pressures, and Gauss-Newton does not lead an armature from one stop to the other.
+The fit bends parameters instead.  The run of the window before knows better: its last state, for
+all that is not measured, is tried as the start of the next, kept by the windows which it suits
+better, and the fit goes on.  What one window learns its successor has in the next round.
+
+Source: the continuity of multiple shooting (Bock 1983), as a guess and not as a constraint: a model
+that lacks something does not hold it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from workbench.fitting.errors import penalised_rmse
+from workbench.fitting.gauss_newton import Fit, best_of_each, fit_windows, points_costs
+from workbench.fitting.linearised import Point, plant_at
+from workbench.fitting.problem import ITERATIONS, Problem, held_out_fit
+from workbench.fitting.short_windows import at_noise
+from workbench.fitting.windows import Windows
+
+ROUNDS = 6
+WEIGHINGS = 2  # the second by the errors that the first leaves
+WORTH_IT = 1e-3  # of the cost, for another round
+
+
+def with_continued_starts(problem: Problem) -> Problem:
+    """The problem with its prior fit from such starts, weighed by its own errors, if that is better.
+
+    Errors of a fit that lost its impacts give weights by which the right one is no better.  So
+    fits are compared by their errors alone, as the mean over outputs of their logarithm.  Nothing
+    is tried where all outputs are at their noise.
+    """
+    base = problem.base
+    if at_noise(base) or not len(base.windows.plant.state_list):
+        return problem
+    better = base
+    for _ in range(WEIGHINGS):
+        windows = better.windows.rescaled(better.residual)
+        better = fit_windows(windows, better.unknowns, better.point, ITERATIONS)
+        better = continued(better, ITERATIONS)
+    if not _errors(better) < _errors(base):
+        return problem
+    held_out = problem.base_validation
+    if held_out:
+        held_out = continued(held_out_fit(held_out.windows, better), ITERATIONS)
+    return replace(problem, base=better, base_validation=held_out)
+
+
+def _errors(fit: Fit) -> float:
+    """Mean over outputs of the logarithm of the error, none below its noise."""
+    return float(np.mean(np.log(np.maximum(penalised_rmse(fit), fit.windows.noise))))
+
+
+def continued(fit: Fit, iterations: int) -> Fit:
+    """The same fit, or a lower one from starts that earlier windows give.
+
+    ``iterations`` bound the fit of each round.
+    """
+    for _ in range(ROUNDS):
+        starts = ends_before(fit)
+        if not np.any(starts != fit.point.starts):
+            break
+        points = [fit.point, Point(fit.point.t, starts)]
+        costs = points_costs(fit.windows, fit.unknowns, points).rows
+        tried = fit_windows(fit.windows, fit.unknowns, best_of_each(costs), iterations)
+        if not tried.cost < (1.0 - WORTH_IT) * fit.cost:
+            break
+        fit = tried
+    return fit
+
+
+def ends_before(fit: Fit) -> np.ndarray:
+    """Start states (n_x, n_windows), those that are not measured from the window before.
+
+    Where there is none, or a gap between, all stay as they are.
+    """
+    windows, starts = fit.windows, fit.point.starts
+    ends = windows.ends(plant_at(windows, fit.unknowns, fit.point.t), starts)
+    hidden = [name not in windows.plant.measured for name in windows.plant.state_list]
+    place = np.flatnonzero(_follows(windows))
+    found = starts.copy()
+    found[np.ix_(hidden, place)] = ends[np.ix_(hidden, place - 1)]
+    return found
+
+
+def _follows(windows: Windows) -> np.ndarray:
+    """True for windows that begin where the one before ended, shape (n_windows,)."""
+    rows = []
+    for recording, firsts in zip(windows.recordings, windows.firsts, strict=True):
+        own = np.array(firsts, dtype=int)
+        gap = np.isin(own, recording.starts)
+        rows.append((np.diff(own, prepend=-2 * windows.length) == windows.length) & ~gap)
+    return np.concatenate(rows)
