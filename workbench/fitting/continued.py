@@ -30,7 +30,7 @@ WORTH_IT = 1e-3  # of the cost, for another round
 
 
 def with_continued_starts(problem: Problem) -> Problem:
-    """The problem with its prior fit from such starts, weighed by its own errors, if that is better.
+    """The problem with its prior fit from such starts and weighed by its own errors, if better.
 
     Errors of a fit that lost its impacts give weights by which the right one is no better.  So
     fits are compared by their errors alone, as the mean over outputs of their logarithm.  Nothing
