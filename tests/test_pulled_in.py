@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_fitting import NOISE, sines
+from test_shaken import windows  # noqa: F401  (a fixture)
 
 from studies.hidden_benches import GEARBOX
 from studies.hidden_effects import answer, recordings
@@ -14,21 +14,12 @@ from workbench.fitting.linearised import Point
 from workbench.fitting.problem import FAR, ITERATIONS
 from workbench.fitting.pulled_in import pulled_in
 from workbench.fitting.unknowns import WIDE, nominal_unknowns
-from workbench.fitting.windows import cut_windows
-from workbench.plants import servo_drive
 
-LOUD = {name: 10.0 * sigma for name, sigma in NOISE.items()}
 ADDED = "friction.viscous_n_s_m"  # stands for what was added: it is given no prior
 
 
 @pytest.fixture(scope="module")
-def windows():
-    plant = servo_drive().lean()
-    return cut_windows(plant, [sines(plant, LOUD)], LOUD)
-
-
-@pytest.fixture(scope="module")
-def fitted(windows):
+def fitted(windows):  # noqa: F811
     unknowns = nominal_unknowns(windows.plant)
     precision = np.where([name == ADDED for name in unknowns.names], WIDE**-2, 1.0)
     unknowns = replace(unknowns, precision=precision)

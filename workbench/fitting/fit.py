@@ -94,11 +94,11 @@ def fit(
         warnings.warn(NO_EVIDENCE, stacklevel=2)
     progress("fit")
     problem = pose(held, train, validation)
-    before = errors_of(*as_it_came(problem.base, problem.base_validation))
     progress("the same from short windows and from earlier ones, if that leads lower")
     problem = better_from_short_windows(with_continued_starts(problem), train)
     problem = with_continued_starts(problem)
     base = problem.base
+    before = errors_of(*as_it_came(base, problem.base_validation))
     covariance = posterior_covariance(base)
     return FitReport(
         rig=fitted_rig(rig, base, ()),
