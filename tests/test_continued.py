@@ -8,6 +8,7 @@ import pytest
 from test_fitting import NOISE, sines
 
 from studies.commissioning import recorded
+from studies.gear_shift_study import _truth
 from studies.shift_check import NOISE as GEARBOX_NOISE
 from workbench.fitting.continued import continued, ends_before, with_continued_starts
 from workbench.fitting.errors import penalised_rmse
@@ -106,8 +107,6 @@ def test_a_fit_of_a_drawn_gearbox_comes_to_its_noise():
 
     Its port stays more than two prior deviations off: the recording does not tell it.
     """
-    from studies.gear_shift_study import _truth
-
     truth = _truth(16)
     found = fit(default_rig(gearbox()), [recorded(truth, 16)])
 

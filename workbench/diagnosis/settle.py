@@ -18,8 +18,8 @@ from dataclasses import replace
 from workbench.candidate import Candidate
 from workbench.diagnosis.refit import ITERATIONS, sizes
 from workbench.diagnosis.result import Ranked, Size
-from workbench.fitting.gauss_newton import Fit, fit_windows
-from workbench.fitting.problem import Problem
+from workbench.fitting.gauss_newton import Fit
+from workbench.fitting.problem import Problem, weighed_anew
 
 ROUNDS = 4
 STEADY = 0.02  # of a size, by which the last round may still move it
@@ -40,8 +40,7 @@ def settled(fit: Fit, candidate: Candidate) -> Fit:
     names = tuple(name for each in candidate.singles for name in each.moved)
     before = sizes(fit, names)
     for _ in range(ROUNDS):
-        windows = fit.windows.rescaled(fit.residual)
-        fit = fit_windows(windows, fit.unknowns, fit.point, ITERATIONS)
+        fit = weighed_anew(fit, ITERATIONS)
         now = sizes(fit, names)
         if _steady(before, now):
             break

@@ -20,7 +20,7 @@ import numpy as np
 from workbench.fitting.errors import penalised_rmse
 from workbench.fitting.gauss_newton import Fit, best_of_each, fit_windows, points_costs
 from workbench.fitting.linearised import Point, plant_at
-from workbench.fitting.problem import ITERATIONS, Problem, held_out_fit
+from workbench.fitting.problem import ITERATIONS, Problem, held_out_fit, weighed_anew
 from workbench.fitting.short_windows import at_noise
 from workbench.fitting.windows import Windows
 
@@ -41,9 +41,7 @@ def with_continued_starts(problem: Problem) -> Problem:
         return problem
     better = base
     for _ in range(WEIGHINGS):
-        windows = better.windows.rescaled(better.residual)
-        better = fit_windows(windows, better.unknowns, better.point, ITERATIONS)
-        better = continued(better, ITERATIONS)
+        better = continued(weighed_anew(better, ITERATIONS), ITERATIONS)
     if not _errors(better) < _errors(base):
         return problem
     held_out = problem.base_validation

@@ -95,8 +95,9 @@ def fit(
     progress("fit")
     problem = pose(held, train, validation)
     progress("the same from short windows and from earlier ones, if that leads lower")
-    problem = better_from_short_windows(with_continued_starts(problem), train)
-    problem = with_continued_starts(problem)
+    better = better_from_short_windows(with_continued_starts(problem), train)
+    if better is not problem:
+        problem = with_continued_starts(better)
     base = problem.base
     before = errors_of(*as_it_came(base, problem.base_validation))
     covariance = posterior_covariance(base)

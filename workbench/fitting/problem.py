@@ -194,7 +194,13 @@ def fitted_twice(windows: Windows, unknowns: Unknowns, t: np.ndarray) -> Fit:
     start = Point(t, windows.start)
     windows = windows.rescaled(windows.residuals([plant_at(windows, unknowns, t)], start.starts)[0])
     rough = fit_windows(windows, unknowns, start, FIRST_ITERATIONS)
-    return fit_windows(windows.rescaled(rough.residual), unknowns, rough.point, ITERATIONS)
+    return weighed_anew(rough, ITERATIONS)
+
+
+def weighed_anew(fit: Fit, iterations: int) -> Fit:
+    """The fit followed further with weights from the errors that it leaves."""
+    windows = fit.windows.rescaled(fit.residual)
+    return fit_windows(windows, fit.unknowns, fit.point, iterations)
 
 
 def held_out_fit(windows: Windows, base: Fit) -> Fit:

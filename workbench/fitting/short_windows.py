@@ -26,6 +26,7 @@ from workbench.fitting.problem import (
     Problem,
     fitted_twice,
     held_out_fit,
+    weighed_anew,
 )
 from workbench.fitting.window_length import FEWEST_SAMPLES, moves
 from workbench.fitting.windows import cut_windows
@@ -50,8 +51,7 @@ def better_from_short_windows(problem: Problem, train: Sequence[Recording]) -> P
     tried = fit_windows(windows, base.unknowns, Point(t, windows.start), ITERATIONS)
     if tried.cost > base.cost - LEAST_IMPROVEMENT * problem.misfit:
         return problem
-    windows = windows.rescaled(tried.residual)
-    better = fit_windows(windows, base.unknowns, tried.point, ITERATIONS)
+    better = weighed_anew(tried, ITERATIONS)
     held_out = problem.base_validation and held_out_fit(problem.base_validation.windows, better)
     return replace(problem, base=better, base_validation=held_out)
 

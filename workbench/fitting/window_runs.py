@@ -30,20 +30,21 @@ class WindowRuns:
 
         ``x0`` is the start as the sensors show it.
         """
-        together, runs = self.model.ensemble(self.sample_time_s), x0.shape[1]
+        together = self.model.ensemble(self.sample_time_s)
         if together is None:
-            return result(self._by_casadi(runs), x0, u, d, p)
-        first = slice(None, None, self.length)
-        begun = result(self._begin.map(runs), x0, u[:, first], d[:, first], p)
-        return together(begun, u, d, p, THREADS)
+            return result(self._by_casadi(x0.shape[1]), x0, u, d, p)
+        return together(self._begun(x0, u, d, p), u, d, p, THREADS)
 
     def ends(self, x0: np.ndarray, u: np.ndarray, d: np.ndarray, p: np.ndarray) -> np.ndarray:
         """States (n_x, runs) one sample after the last; arguments as those of :meth:`outputs`."""
-        first = slice(None, None, self.length)
-        begun = result(self._begin.map(x0.shape[1]), x0, u[:, first], d[:, first], p)
-        run = self.model.run(self.sample_time_s, self.length)
-        later = result(run.map(x0.shape[1], "thread", THREADS), begun, u, d, p)
+        run = self.model.run(self.sample_time_s, self.length).map(x0.shape[1], "thread", THREADS)
+        later = result(run, self._begun(x0, u, d, p), u, d, p)
         return later[:, self.length - 1 :: self.length]
+
+    def _begun(self, x0: np.ndarray, u: np.ndarray, d: np.ndarray, p: np.ndarray) -> np.ndarray:
+        """States (n_x, runs) at the first sample; arguments as those of :meth:`outputs`."""
+        first = slice(None, None, self.length)
+        return result(self._begin.map(x0.shape[1]), x0, u[:, first], d[:, first], p)
 
     def _by_casadi(self, runs: int) -> ca.Function:
         """So many runs; built once."""
