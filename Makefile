@@ -10,6 +10,9 @@ UV := $(shell command -v uv 2>/dev/null)
 COMPILER := $(shell command -v cc || command -v gcc || command -v clang)
 LOCKS := -r requirements.lock $(if $(COMPILER),,-r compiler.lock)
 
+# Two workers test at a time: further threads of BLAS would only wait for a core.
+export OPENBLAS_NUM_THREADS ?= 1
+
 .PHONY: demo test test-all lint lock clean
 
 demo: $(READY)

@@ -1,6 +1,7 @@
 """The command `workbench` as a user meets it: what it prints, writes, refuses and answers."""
 
 import json
+import os
 import subprocess
 import sys
 import time
@@ -54,6 +55,17 @@ def test_help_is_there_at_once_for_every_command_with_an_example():
         answer = call(name, "--help")
         assert answer.exit_code == 0
         assert f"Example:\n    workbench {name}" in answer.output
+
+
+@pytest.mark.parametrize(("chosen", "used"), [({}, "1"), ({"OPENBLAS_NUM_THREADS": "4"}, "4")])
+def test_matrix_products_take_one_thread_unless_another_number_was_chosen(chosen, used):
+    told = "print(os.environ['OPENBLAS_NUM_THREADS'], 'numpy' in sys.modules)"
+    code = f"import os, sys, studies.command_line as c; c.app = lambda: {told}; c.main()"
+    kept = {k: v for k, v in os.environ.items() if k != "OPENBLAS_NUM_THREADS"}
+
+    run = [sys.executable, "-c", code]
+    said = subprocess.run(run, env=kept | chosen, capture_output=True, text=True, check=True)
+    assert said.stdout.split() == [used, "False"]
 
 
 def test_plants_are_listed_one_line_each():

@@ -1,7 +1,6 @@
 """Windows that begin where the one before them ended."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,10 +9,11 @@ from test_fitting import NOISE, sines
 from studies.commissioning import recorded
 from studies.gear_shift_study import _truth
 from studies.shift_check import NOISE as GEARBOX_NOISE
-from workbench.fitting.continued import continued, ends_before, with_continued_starts
+from workbench.fitting.continued import continued, ends_before
 from workbench.fitting.errors import penalised_rmse
 from workbench.fitting.fit import fit
 from workbench.fitting.gauss_newton import fit_windows
+from workbench.fitting.problem import with_continued_starts
 from workbench.fitting.start_states import refit_starts
 from workbench.fitting.unknowns import nominal_unknowns
 from workbench.fitting.windows import cut_windows
@@ -96,9 +96,9 @@ def test_nothing_is_carried_across_what_was_not_recorded(guessed, away):
 def test_a_fit_at_the_noise_stays_as_it_is():
     plant = servo_drive().lean()
     windows = cut_windows(plant, [sines(plant, NOISE)], NOISE)
-    problem = SimpleNamespace(base=fit_windows(windows, nominal_unknowns(plant)))
+    found = fit_windows(windows, nominal_unknowns(plant))
 
-    assert with_continued_starts(problem) is problem
+    assert with_continued_starts(found) is found
 
 
 @pytest.mark.slow

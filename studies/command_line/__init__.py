@@ -3,6 +3,7 @@
 Whatever takes time to import is imported inside the commands, so that ``--help`` is quick.
 """
 
+import os
 from typing import Any
 
 from studies.command_line import (
@@ -65,7 +66,13 @@ __all__ = [
 
 
 def main() -> None:
-    """Entry point of the command ``workbench``."""
+    """Entry point of the command ``workbench``.
+
+    Matrices here are small: a second thread of BLAS gains nothing on them, and beside the threads
+    that simulate it waits for a core, for which products took hundreds of times as long.  Said
+    before NumPy is imported, which reads it then; who has set another number keeps it.
+    """
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     app()
 
 

@@ -15,6 +15,7 @@ from workbench.candidate import Candidate
 from workbench.diagnosis.result import Size
 from workbench.diagnosis.rough import Rough, windows_for
 from workbench.diagnosis.shifts import Shift
+from workbench.fitting.continued import continued
 from workbench.fitting.error_model import OUTLYING
 from workbench.fitting.errors import plain_ratio
 from workbench.fitting.gauss_newton import Fit, beyond_noise, fit_windows, points_costs
@@ -85,7 +86,8 @@ def refit_shaken(problem: Problem, found: Refit) -> Refit:
 
     See :mod:`workbench.fitting.pulled_in` and :mod:`workbench.fitting.shaken`.
     """
-    fit = shaken(pulled_in(found.fit, ITERATIONS), ITERATIONS)
+    nearer = pulled_in(continued(found.fit, ITERATIONS), ITERATIONS)
+    fit = shaken(continued(nearer, ITERATIONS), ITERATIONS)
     return found if fit is found.fit else _refit(problem, found.candidate, fit, tuple(found.size))
 
 

@@ -13,46 +13,14 @@ that lacks something does not hold it.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
-from workbench.fitting.errors import penalised_rmse
 from workbench.fitting.gauss_newton import Fit, best_of_each, fit_windows, points_costs
 from workbench.fitting.linearised import Point, plant_at
-from workbench.fitting.problem import ITERATIONS, Problem, held_out_fit, weighed_anew
-from workbench.fitting.short_windows import at_noise
 from workbench.fitting.windows import Windows
 
 ROUNDS = 6
-WEIGHINGS = 2  # the second by the errors that the first leaves
 WORTH_IT = 1e-3  # of the cost, for another round
-
-
-def with_continued_starts(problem: Problem) -> Problem:
-    """The problem with its prior fit from such starts and weighed by its own errors, if better.
-
-    Errors of a fit that lost its impacts give weights by which the right one is no better.  So
-    fits are compared by their errors alone, as the mean over outputs of their logarithm.  Nothing
-    is tried where all outputs are at their noise.
-    """
-    base = problem.base
-    if at_noise(base) or not len(base.windows.plant.state_list):
-        return problem
-    better = base
-    for _ in range(WEIGHINGS):
-        better = continued(weighed_anew(better, ITERATIONS), ITERATIONS)
-    if not _errors(better) < _errors(base):
-        return problem
-    held_out = problem.base_validation
-    if held_out:
-        held_out = continued(held_out_fit(held_out.windows, better), ITERATIONS)
-    return replace(problem, base=better, base_validation=held_out)
-
-
-def _errors(fit: Fit) -> float:
-    """Mean over outputs of the logarithm of the error, none below its noise."""
-    return float(np.mean(np.log(np.maximum(penalised_rmse(fit), fit.windows.noise))))
 
 
 def continued(fit: Fit, iterations: int) -> Fit:
@@ -65,11 +33,10 @@ def continued(fit: Fit, iterations: int) -> Fit:
         if not np.any(starts != fit.point.starts):
             break
         points = [fit.point, Point(fit.point.t, starts)]
-        costs = points_costs(fit.windows, fit.unknowns, points).rows
-        tried = fit_windows(fit.windows, fit.unknowns, best_of_each(costs), iterations)
-        if not tried.cost < (1.0 - WORTH_IT) * fit.cost:
+        begun = best_of_each(points_costs(fit.windows, fit.unknowns, points).rows)
+        if not begun.cost < (1.0 - WORTH_IT) * fit.cost:
             break
-        fit = tried
+        fit = fit_windows(fit.windows, fit.unknowns, begun, iterations)
     return fit
 
 

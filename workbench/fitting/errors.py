@@ -41,6 +41,8 @@ class SignalError:
         return (self.rmse / self.noise) ** 2
 
 
+AT_NOISE = 1.5  # mean square of an output's error over that of its noise
+
 Errors = Mapping[str, Mapping[str, SignalError]]
 
 
@@ -112,3 +114,8 @@ def errors_of(train: Fit, validation: Fit | None) -> Errors:
     """Errors in units of a fit and of its validation."""
     found = {"train": signal_errors(train)}
     return {**found, "validation": signal_errors(validation)} if validation else found
+
+
+def at_noise(fit: Fit) -> bool:
+    """True where the mean square error of every output is that of its noise."""
+    return bool(np.all(penalised_rmse(fit) ** 2 < AT_NOISE * fit.windows.noise**2))

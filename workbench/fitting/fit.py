@@ -9,7 +9,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from workbench.consistency import checked
-from workbench.fitting.continued import with_continued_starts
 from workbench.fitting.errors import Errors, errors_of
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.posterior import fitted_rig, posterior_covariance
@@ -94,10 +93,8 @@ def fit(
         warnings.warn(NO_EVIDENCE, stacklevel=2)
     progress("fit")
     problem = pose(held, train, validation)
-    progress("the same from short windows and from earlier ones, if that leads lower")
-    better = better_from_short_windows(with_continued_starts(problem), train)
-    if better is not problem:
-        problem = with_continued_starts(better)
+    progress("the same from short windows, if that leads lower")
+    problem = better_from_short_windows(problem, train)
     base = problem.base
     before = errors_of(*as_it_came(base, problem.base_validation))
     covariance = posterior_covariance(base)

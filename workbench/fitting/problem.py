@@ -9,6 +9,8 @@ import numpy as np
 
 from workbench.candidate import Candidate
 from workbench.effect import Effect
+from workbench.fitting.continued import continued
+from workbench.fitting.errors import at_noise, penalised_rmse
 from workbench.fitting.gauss_newton import Fit, beyond_noise, fit_windows, points_costs
 from workbench.fitting.linearised import Linearised, Point, plant_at
 from workbench.fitting.noise import measured_noise
@@ -23,6 +25,7 @@ from workbench.rig import Rig
 
 FIRST_ITERATIONS = 3  # with scales from the model as it came
 ITERATIONS = 12  # with scales from the first fit
+WEIGHINGS = 2  # of a fit from starts that earlier windows give, the second by what the first leaves
 LEAST_HELD_OUT_WINDOWS = 24
 NO_EVIDENCE = "a validation recording is one of the training recordings, which proves nothing"
 FAR = 1.5  # prior deviations: beyond, a parameter may imitate what is missing
@@ -63,7 +66,8 @@ class Problem:
         windows = self.base_validation.windows
         if fit.windows.plant is not windows.plant:
             windows = windows.with_plant(fit.windows.plant)
-        return refit_starts(windows, fit.plant.values, self.base_validation)
+        found = refit_starts(windows, fit.plant.values, self.base_validation)
+        return continued(found, ITERATIONS)
 
     @property
     def at_priors(self) -> np.ndarray:
@@ -148,7 +152,8 @@ def improved_base(problem: Problem, fits: Sequence[Fit]) -> Problem | None:
     better = fit_windows(base.windows, base.unknowns, best, ITERATIONS)
     held_out = problem.base_validation
     if held_out:
-        held_out = refit_starts(held_out.windows, better.plant.values, held_out)
+        begun = refit_starts(held_out.windows, better.plant.values, held_out)
+        held_out = continued(begun, ITERATIONS)
     return replace(problem, base=better, base_validation=held_out)
 
 
@@ -173,7 +178,8 @@ def pose(
     length_s = window_length_s(plant, train, validation)
     windows = cut_windows(plant, train, noise, length_s, most_windows)
     unknowns = nominal_unknowns(plant, rig.deviations, rig.fixed, added)
-    base = shaken(fitted_twice(windows, unknowns, unknowns.scaled(plant.values)), ITERATIONS)
+    first = fitted_twice(windows, unknowns, unknowns.scaled(plant.values))
+    base = shaken(with_continued_starts(first), ITERATIONS)
     held_out = None
     if validation:
         # half as many as the training has are enough to judge a plant that is not fitted to them
@@ -203,11 +209,32 @@ def weighed_anew(fit: Fit, iterations: int) -> Fit:
     return fit_windows(windows, fit.unknowns, fit.point, iterations)
 
 
+def with_continued_starts(fit: Fit) -> Fit:
+    """The fit from starts that earlier windows give and weighed by its own errors, if better.
+
+    Errors of a fit that lost its impacts give weights by which the right one is no better.  So
+    fits are compared by their errors alone, as the mean over outputs of their logarithm.  Nothing
+    is tried where all outputs are at their noise.
+    """
+    if at_noise(fit) or not len(fit.windows.plant.state_list):
+        return fit
+    better = fit
+    for _ in range(WEIGHINGS):
+        better = continued(weighed_anew(better, ITERATIONS), ITERATIONS)
+    return better if _errors(better) < _errors(fit) else fit
+
+
+def _errors(fit: Fit) -> float:
+    """Mean over outputs of the logarithm of the error, none below its noise."""
+    return float(np.mean(np.log(np.maximum(penalised_rmse(fit), fit.windows.noise))))
+
+
 def held_out_fit(windows: Windows, base: Fit) -> Fit:
     """The base on held-out windows, on the yardstick of the training."""
     windows = windows.scaled_like(base.windows)
     rough = refit_starts(windows, base.plant.values)
-    return refit_starts(windows.capped(rough.residual), base.plant.values, rough)
+    begun = refit_starts(windows.capped(rough.residual), base.plant.values, rough)
+    return continued(begun, ITERATIONS)
 
 
 def proves_nothing(train: Sequence[Recording], validation: Sequence[Recording]) -> bool:

@@ -17,8 +17,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from workbench.fitting.errors import penalised_rmse
-from workbench.fitting.gauss_newton import Fit, fit_windows
+from workbench.fitting.errors import at_noise
+from workbench.fitting.gauss_newton import fit_windows
 from workbench.fitting.linearised import Point
 from workbench.fitting.problem import (
     ITERATIONS,
@@ -27,13 +27,13 @@ from workbench.fitting.problem import (
     fitted_twice,
     held_out_fit,
     weighed_anew,
+    with_continued_starts,
 )
 from workbench.fitting.window_length import FEWEST_SAMPLES, moves
 from workbench.fitting.windows import cut_windows
 from workbench.recording import Recording
 
 SHARES = (0.1, 0.2, 0.4, 0.7)  # of the length of a window, one after the other
-AT_NOISE = 1.5  # mean square of an output's error over that of its noise
 
 
 def better_from_short_windows(problem: Problem, train: Sequence[Recording]) -> Problem:
@@ -51,14 +51,9 @@ def better_from_short_windows(problem: Problem, train: Sequence[Recording]) -> P
     tried = fit_windows(windows, base.unknowns, Point(t, windows.start), ITERATIONS)
     if tried.cost > base.cost - LEAST_IMPROVEMENT * problem.misfit:
         return problem
-    better = weighed_anew(tried, ITERATIONS)
+    better = with_continued_starts(weighed_anew(tried, ITERATIONS))
     held_out = problem.base_validation and held_out_fit(problem.base_validation.windows, better)
     return replace(problem, base=better, base_validation=held_out)
-
-
-def at_noise(fit: Fit) -> bool:
-    """True where the mean square error of every output is that of its noise."""
-    return bool(np.all(penalised_rmse(fit) ** 2 < AT_NOISE * fit.windows.noise**2))
 
 
 def _of_short_windows(problem: Problem, train: Sequence[Recording]) -> np.ndarray:
