@@ -13,7 +13,7 @@ from workbench.fitting.continued import continued, ends_before
 from workbench.fitting.errors import penalised_rmse
 from workbench.fitting.fit import fit
 from workbench.fitting.gauss_newton import fit_windows
-from workbench.fitting.problem import with_continued_starts
+from workbench.fitting.own_errors import by_own_errors
 from workbench.fitting.start_states import refit_starts
 from workbench.fitting.unknowns import nominal_unknowns
 from workbench.fitting.windows import cut_windows
@@ -98,7 +98,7 @@ def test_a_fit_at_the_noise_stays_as_it_is():
     windows = cut_windows(plant, [sines(plant, NOISE)], NOISE)
     found = fit_windows(windows, nominal_unknowns(plant))
 
-    assert with_continued_starts(found) is found
+    assert by_own_errors(found) is found
 
 
 @pytest.mark.slow

@@ -239,7 +239,8 @@ def _beside(problem: Problem, leader: Refit, rival: Profile, known: Refit | None
     """A rival refitted from where the leader ended, with its own size, or else that of the scan."""
     size = {name: each.value for name, each in known.size.items()} if known else {}
     own = {**rival.trials[0].values, **size}
-    return refit_from(problem, rival.candidate, {**leader.fit.plant.values, **own})
+    values = {**leader.fit.plant.values, **own}
+    return refit_from(problem, rival.candidate, values, leader.fit)
 
 
 def _shortlist(

@@ -27,6 +27,7 @@ from workbench.diagnosis.refit import Refit
 from workbench.diagnosis.result import Law, Ranked
 from workbench.diagnosis.scan import Profile
 from workbench.fitting.gauss_newton import Fit
+from workbench.fitting.own_errors import effective_by_output
 from workbench.fitting.window_length import moves
 
 LEAST_BIC = 4.0
@@ -110,9 +111,7 @@ def _bic_gain(base: Fit, fit: Fit, parameters: int) -> float:
 
 def effective_samples(fit: Fit) -> float:
     """Recorded values over the correlation times of their errors."""
-    windows = fit.windows
-    recorded = (windows.weight > 0).sum(axis=2)
-    return float(np.sum(recorded / windows.correlation))
+    return float(effective_by_output(fit.windows).sum())
 
 
 def _size_reasons(refit: Refit) -> list[str]:

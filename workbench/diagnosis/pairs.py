@@ -132,6 +132,6 @@ def _leaves_less(found: Refit, single: Ranked) -> bool:
 
 def _beside(problem: Problem, found: Refit, one: Candidate, other: Candidate) -> tuple[str, ...]:
     """The criteria that one half fails on top of the other alone, fitted from where the pair is."""
-    alone = refit_from(problem, other, found.fit.plant.values)
+    alone = refit_from(problem, other, found.fit.plant.values, found.fit)
     half = replace(found, candidate=one)
     return reasons_against(alone.fit, counted_from(alone.fit, alone.validation, half))

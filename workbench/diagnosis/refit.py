@@ -18,7 +18,13 @@ from workbench.diagnosis.shifts import Shift
 from workbench.fitting.continued import continued
 from workbench.fitting.error_model import OUTLYING
 from workbench.fitting.errors import plain_ratio
-from workbench.fitting.gauss_newton import Fit, beyond_noise, fit_windows, points_costs
+from workbench.fitting.gauss_newton import (
+    Fit,
+    best_of_each,
+    beyond_noise,
+    fit_windows,
+    points_costs,
+)
 from workbench.fitting.linearised import Point
 from workbench.fitting.posterior import posterior_deviation
 from workbench.fitting.problem import Problem, misfit
@@ -68,16 +74,24 @@ def refit(problem: Problem, begun: Rough) -> Refit:
     return _refit(problem, candidate, fit, names)
 
 
-def refit_from(problem: Problem, candidate: Candidate, values: Mapping[str, float]) -> Refit:
-    """Fit a candidate from where a fit of the same effects ended, by its parameter values."""
+def refit_from(
+    problem: Problem, candidate: Candidate, values: Mapping[str, float], near: Fit | None = None
+) -> Refit:
+    """Fit a candidate from where a fit of the same effects ended, by its parameter values.
+
+    ``near`` is a fit on the same windows whose start states are taken where they suit better than
+    those of the base.
+    """
     windows = windows_for(problem, candidate)
     unknowns = problem.unknowns(windows.plant, candidate)
     shapes = [f"{c.member}.{key}" for c in candidate.singles for key in c.cause.shapes]
     held = {name: values[name] for name in shapes if name not in unknowns.names}
     unknowns = replace(unknowns, held={**unknowns.held, **held})
     t = unknowns.clipped(unknowns.scaled({**windows.plant.values, **values}))
-    starts = carried(problem.base.point.starts, problem.base.windows, windows)
-    fit = fit_windows(windows, unknowns, Point(t, starts), ITERATIONS)
+    fits = (problem.base, near) if near else (problem.base,)
+    points = [Point(t, carried(each.point.starts, each.windows, windows)) for each in fits]
+    begun = best_of_each(points_costs(windows, unknowns, points).rows)
+    fit = fit_windows(windows, unknowns, begun, ITERATIONS)
     return _refit(problem, candidate, fit, (candidate.strength, *candidate.forms))
 
 

@@ -19,7 +19,8 @@ from workbench.candidate import Candidate
 from workbench.diagnosis.refit import ITERATIONS, sizes
 from workbench.diagnosis.result import Ranked, Size
 from workbench.fitting.gauss_newton import Fit
-from workbench.fitting.problem import Problem, weighed_anew
+from workbench.fitting.own_errors import weighed_anew
+from workbench.fitting.problem import Problem
 
 ROUNDS = 4
 STEADY = 0.02  # of a size, by which the last round may still move it

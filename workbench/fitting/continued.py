@@ -15,12 +15,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from workbench.fitting.gauss_newton import Fit, best_of_each, fit_windows, points_costs
+from workbench.fitting.gauss_newton import (
+    Fit,
+    best_of_each,
+    beyond_noise,
+    fit_windows,
+    points_costs,
+)
 from workbench.fitting.linearised import Point, plant_at
 from workbench.fitting.windows import Windows
 
 ROUNDS = 6
-WORTH_IT = 1e-3  # of the cost, for another round
+WORTH_IT = 0.003  # of the misfit, for a fit from the new starts
 
 
 def continued(fit: Fit, iterations: int) -> Fit:
@@ -28,27 +34,32 @@ def continued(fit: Fit, iterations: int) -> Fit:
 
     ``iterations`` bound the fit of each round.
     """
+    windows, unknowns = fit.windows, fit.unknowns
     for _ in range(ROUNDS):
         starts = ends_before(fit)
         if not np.any(starts != fit.point.starts):
             break
         points = [fit.point, Point(fit.point.t, starts)]
-        begun = best_of_each(points_costs(fit.windows, fit.unknowns, points).rows)
-        if not begun.cost < (1.0 - WORTH_IT) * fit.cost:
+        begun = best_of_each(points_costs(windows, unknowns, points).rows)
+        if not begun.cost < fit.cost - WORTH_IT * beyond_noise(fit.cost, windows):
             break
-        fit = fit_windows(fit.windows, fit.unknowns, begun, iterations)
+        fit = fit_windows(windows, unknowns, begun, iterations)
     return fit
 
 
 def ends_before(fit: Fit) -> np.ndarray:
     """Start states (n_x, n_windows), those that are not measured from the window before.
 
-    Where there is none, or a gap between, all stay as they are.
+    Where there is none, a gap between, or no finite end, all stay as they are.
     """
     windows, starts = fit.windows, fit.point.starts
-    ends = windows.ends(plant_at(windows, fit.unknowns, fit.point.t), starts)
-    hidden = [name not in windows.plant.measured for name in windows.plant.state_list]
+    names = windows.plant.state_list
+    hidden = np.array([name not in windows.plant.measured for name in names], dtype=bool)
     place = np.flatnonzero(_follows(windows))
+    if not hidden.any() or not len(place):
+        return starts
+    ends = windows.ends(plant_at(windows, fit.unknowns, fit.point.t), starts)
+    place = place[np.isfinite(ends[:, place - 1]).all(axis=0)]
     found = starts.copy()
     found[np.ix_(hidden, place)] = ends[np.ix_(hidden, place - 1)]
     return found

@@ -11,6 +11,7 @@ import numpy as np
 from workbench.consistency import checked
 from workbench.fitting.errors import Errors, errors_of
 from workbench.fitting.gauss_newton import Fit
+from workbench.fitting.own_errors import by_own_errors
 from workbench.fitting.posterior import fitted_rig, posterior_covariance
 from workbench.fitting.problem import NO_EVIDENCE, pose, proves_nothing
 from workbench.fitting.short_windows import better_from_short_windows
@@ -93,7 +94,9 @@ def fit(
         warnings.warn(NO_EVIDENCE, stacklevel=2)
     progress("fit")
     problem = pose(held, train, validation)
-    progress("the same from short windows, if that leads lower")
+    progress("the same by its own errors and from short windows, if that is better")
+    own = by_own_errors(problem.base)
+    problem = problem if own is problem.base else problem.with_base(own)
     problem = better_from_short_windows(problem, train)
     base = problem.base
     before = errors_of(*as_it_came(base, problem.base_validation))

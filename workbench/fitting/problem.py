@@ -10,10 +10,10 @@ import numpy as np
 from workbench.candidate import Candidate
 from workbench.effect import Effect
 from workbench.fitting.continued import continued
-from workbench.fitting.errors import at_noise, penalised_rmse
 from workbench.fitting.gauss_newton import Fit, beyond_noise, fit_windows, points_costs
 from workbench.fitting.linearised import Linearised, Point, plant_at
 from workbench.fitting.noise import measured_noise
+from workbench.fitting.own_errors import ITERATIONS, consistent, weighed_anew
 from workbench.fitting.shaken import shaken
 from workbench.fitting.start_states import refit_starts
 from workbench.fitting.unknowns import Unknowns, nominal_unknowns
@@ -24,8 +24,6 @@ from workbench.recording import Recording, same_data
 from workbench.rig import Rig
 
 FIRST_ITERATIONS = 3  # with scales from the model as it came
-ITERATIONS = 12  # with scales from the first fit
-WEIGHINGS = 2  # of a fit from starts that earlier windows give, the second by what the first leaves
 LEAST_HELD_OUT_WINDOWS = 24
 NO_EVIDENCE = "a validation recording is one of the training recordings, which proves nothing"
 FAR = 1.5  # prior deviations: beyond, a parameter may imitate what is missing
@@ -68,6 +66,11 @@ class Problem:
             windows = windows.with_plant(fit.windows.plant)
         found = refit_starts(windows, fit.plant.values, self.base_validation)
         return continued(found, ITERATIONS)
+
+    def with_base(self, base: Fit) -> Problem:
+        """The same with another prior fit of the same windows, held out too."""
+        held_out = self.base_validation and held_out_fit(self.base_validation.windows, base)
+        return replace(self, base=base, base_validation=held_out)
 
     @property
     def at_priors(self) -> np.ndarray:
@@ -149,12 +152,8 @@ def improved_base(problem: Problem, fits: Sequence[Fit]) -> Problem | None:
         if tried.cost > least:
             return None
         best = tried.point
-    better = fit_windows(base.windows, base.unknowns, best, ITERATIONS)
-    held_out = problem.base_validation
-    if held_out:
-        begun = refit_starts(held_out.windows, better.plant.values, held_out)
-        held_out = continued(begun, ITERATIONS)
-    return replace(problem, base=better, base_validation=held_out)
+    better = continued(fit_windows(base.windows, base.unknowns, best, ITERATIONS), ITERATIONS)
+    return replace(problem, base=better, base_validation=problem.validated(better))
 
 
 def pose(
@@ -163,7 +162,10 @@ def pose(
     validation: Sequence[Recording] = (),
     most_windows: int = MOST_WINDOWS,
 ) -> Problem:
-    """Cut, fit twice (the second time with the error model of the first), and validate.
+    """Cut, fit and validate.
+
+    The fit is made twice, the second time with the error model of the first, and again where that
+    one tells far larger errors; then from starts that earlier windows give and points beside it.
 
     Raises
     ------
@@ -179,7 +181,7 @@ def pose(
     windows = cut_windows(plant, train, noise, length_s, most_windows)
     unknowns = nominal_unknowns(plant, rig.deviations, rig.fixed, added)
     first = fitted_twice(windows, unknowns, unknowns.scaled(plant.values))
-    base = shaken(with_continued_starts(first), ITERATIONS)
+    base = shaken(continued(consistent(first), ITERATIONS), ITERATIONS)
     held_out = None
     if validation:
         # half as many as the training has are enough to judge a plant that is not fitted to them
@@ -200,39 +202,13 @@ def fitted_twice(windows: Windows, unknowns: Unknowns, t: np.ndarray) -> Fit:
     start = Point(t, windows.start)
     windows = windows.rescaled(windows.residuals([plant_at(windows, unknowns, t)], start.starts)[0])
     rough = fit_windows(windows, unknowns, start, FIRST_ITERATIONS)
-    return weighed_anew(rough, ITERATIONS)
-
-
-def weighed_anew(fit: Fit, iterations: int) -> Fit:
-    """The fit followed further with weights from the errors that it leaves."""
-    windows = fit.windows.rescaled(fit.residual)
-    return fit_windows(windows, fit.unknowns, fit.point, iterations)
-
-
-def with_continued_starts(fit: Fit) -> Fit:
-    """The fit from starts that earlier windows give and weighed by its own errors, if better.
-
-    Errors of a fit that lost its impacts give weights by which the right one is no better.  So
-    fits are compared by their errors alone, as the mean over outputs of their logarithm.  Nothing
-    is tried where all outputs are at their noise.
-    """
-    if at_noise(fit) or not len(fit.windows.plant.state_list):
-        return fit
-    better = fit
-    for _ in range(WEIGHINGS):
-        better = continued(weighed_anew(better, ITERATIONS), ITERATIONS)
-    return better if _errors(better) < _errors(fit) else fit
-
-
-def _errors(fit: Fit) -> float:
-    """Mean over outputs of the logarithm of the error, none below its noise."""
-    return float(np.mean(np.log(np.maximum(penalised_rmse(fit), fit.windows.noise))))
+    return weighed_anew(rough)
 
 
 def held_out_fit(windows: Windows, base: Fit) -> Fit:
     """The base on held-out windows, on the yardstick of the training."""
     windows = windows.scaled_like(base.windows)
-    rough = refit_starts(windows, base.plant.values)
+    rough = continued(refit_starts(windows, base.plant.values), ITERATIONS)
     begun = refit_starts(windows.capped(rough.residual), base.plant.values, rough)
     return continued(begun, ITERATIONS)
 

@@ -13,22 +13,14 @@ ODE", whose short intervals widen the valley of the right parameters.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from workbench.fitting.errors import at_noise
 from workbench.fitting.gauss_newton import fit_windows
 from workbench.fitting.linearised import Point
-from workbench.fitting.problem import (
-    ITERATIONS,
-    LEAST_IMPROVEMENT,
-    Problem,
-    fitted_twice,
-    held_out_fit,
-    weighed_anew,
-    with_continued_starts,
-)
+from workbench.fitting.own_errors import ITERATIONS, better_of, by_own_errors, weighed_anew
+from workbench.fitting.problem import Problem, fitted_twice
 from workbench.fitting.window_length import FEWEST_SAMPLES, moves
 from workbench.fitting.windows import cut_windows
 from workbench.recording import Recording
@@ -49,11 +41,8 @@ def better_from_short_windows(problem: Problem, train: Sequence[Recording]) -> P
     t = _of_short_windows(problem, train)
     windows = base.windows
     tried = fit_windows(windows, base.unknowns, Point(t, windows.start), ITERATIONS)
-    if tried.cost > base.cost - LEAST_IMPROVEMENT * problem.misfit:
-        return problem
-    better = with_continued_starts(weighed_anew(tried, ITERATIONS))
-    held_out = problem.base_validation and held_out_fit(problem.base_validation.windows, better)
-    return replace(problem, base=better, base_validation=held_out)
+    better = better_of(base, by_own_errors(weighed_anew(tried)))
+    return problem if better is base else problem.with_base(better)
 
 
 def _of_short_windows(problem: Problem, train: Sequence[Recording]) -> np.ndarray:

@@ -53,9 +53,13 @@ def _same_states(near: Fit, windows: Windows) -> bool:
 
 
 def carried(starts: np.ndarray, near: Windows, windows: Windows) -> np.ndarray:
-    """Start states of windows for those of a plant with more states, shape (n_x, n_windows)."""
+    """Start states (n_x, n_windows) of windows from those of a plant with other states.
+
+    What that one does not have begins as guessed.
+    """
     found = windows.start.copy()
     names = list(windows.plant.state_list)
     for row, name in enumerate(near.plant.state_list):
-        found[names.index(name)] = starts[row]
+        if name in names:
+            found[names.index(name)] = starts[row]
     return found
