@@ -1,6 +1,7 @@
 """Windows that begin where the one before them ended."""
 
 from dataclasses import replace
+from math import nan
 
 import numpy as np
 import pytest
@@ -9,20 +10,21 @@ from test_fitting import NOISE, sines
 from studies.commissioning import recorded
 from studies.gear_shift_study import _truth
 from studies.shift_check import NOISE as GEARBOX_NOISE
+from workbench.diagnosis.refit import Refit, refit_from, refit_shaken
 from workbench.fitting.continued import continued, ends_before
 from workbench.fitting.errors import penalised_rmse
 from workbench.fitting.fit import fit
 from workbench.fitting.gauss_newton import fit_windows
-from workbench.fitting.own_errors import by_own_errors
+from workbench.fitting.problem import Problem, held_out_fit
 from workbench.fitting.start_states import refit_starts
-from workbench.fitting.unknowns import nominal_unknowns
-from workbench.fitting.windows import cut_windows
+from workbench.fitting.windows import Windows, cut_windows
 from workbench.plants import servo_drive
 from workbench.plants.gearbox import gearbox
 from workbench.rig import default_rig
 from workbench.simulation import inputs
 
 LASTS_S, WINDOW_S = 1.0, 0.15
+SPRING = gearbox().candidates["spring_force"]
 
 
 @pytest.fixture(scope="module")
@@ -37,6 +39,11 @@ def guessed(shifted):
     """Its windows from guessed starts, with the right parameters."""
     plant = gearbox().lean()
     return refit_starts(cut_windows(plant, [shifted], GEARBOX_NOISE, WINDOW_S))
+
+
+def posed_with(fit):
+    """A problem whose prior fit this is, held out the same."""
+    return Problem(default_rig(gearbox()), gearbox(), (), fit, fit)
 
 
 def loudest(found):
@@ -93,12 +100,54 @@ def test_nothing_is_carried_across_what_was_not_recorded(guessed, away):
     np.testing.assert_array_equal(ends_before(found)[:, same], found.point.starts[:, same])
 
 
-def test_a_fit_at_the_noise_stays_as_it_is():
-    plant = servo_drive().lean()
-    windows = cut_windows(plant, [sines(plant, NOISE)], NOISE)
-    found = fit_windows(windows, nominal_unknowns(plant))
+def test_a_window_without_a_finite_end_holds_up_no_other(guessed, monkeypatch):
+    worst = int(np.argmax((guessed.residual**2).sum(axis=(0, 2))))
+    failed = 0 if worst != 1 else 1
 
-    assert by_own_errors(found) is found
+    def ends(windows, plant, starts):
+        found = own(windows, plant, starts)
+        found[:, failed] = np.nan
+        return found
+
+    own = Windows.ends
+    monkeypatch.setattr(Windows, "ends", ends)
+    starts, later = ends_before(guessed), failed + 1
+
+    np.testing.assert_array_equal(starts[:, later], guessed.point.starts[:, later])
+    assert np.isfinite(starts).all()
+    assert continued(guessed, 8).cost < 0.5 * guessed.cost
+
+
+def test_a_fit_is_validated_from_such_starts(guessed):
+    problem = posed_with(guessed)
+
+    assert loudest(problem.validated(guessed)) < 0.5 * loudest(guessed)
+
+
+def test_held_out_windows_that_began_wrong_count_like_the_others(guessed):
+    found = held_out_fit(guessed.windows, guessed)
+
+    assert loudest(found) < 1.1
+    assert np.ptp(found.windows.scale, axis=1).max() < 1e-9 * found.windows.scale.max()
+
+
+def test_a_refit_that_is_followed_further_goes_on_from_such_starts(guessed):
+    problem = posed_with(guessed)
+    begun = Refit(SPRING, guessed, None, {}, 0.0, nan, nan)
+    found = refit_shaken(problem, begun)
+
+    assert loudest(found.fit) < 1.1
+    assert found.drop_train > 0.5
+
+
+def test_a_rival_begins_with_the_starts_of_the_leader_where_they_suit_better(guessed, monkeypatch):
+    monkeypatch.setattr("workbench.diagnosis.refit.ITERATIONS", 0)  # the start alone tells
+    problem, leader = posed_with(guessed), continued(guessed, 8)
+    values = {SPRING.strength: 0.0}
+
+    alone = refit_from(problem, SPRING, values)
+    beside = refit_from(problem, SPRING, values, leader)
+    assert beside.fit.cost < 0.5 * alone.fit.cost
 
 
 @pytest.mark.slow
