@@ -4,8 +4,8 @@ The prior fit of a model that lacks something moves what it may to imitate it, a
 missing effect begins there.  With the effect in its place there is nothing to imitate any more.
 But where the cost is rough, as that of impacts which come at the wrong instant, no way may lead
 down from there: the effect gets a part of its size, and the nuisances keep theirs.  So they are
-taken back half the way to their priors, then the whole way, with what was added left as it is; both
-places are followed, and the lowest of the three fits stays.
+taken back half the way to their priors, then the whole way, with what was added and all start
+states left as they are; both places are followed, and the lowest of the three fits stays.
 
 Source: the starts of diagnosis.md 1.5 are those of the scan, near the base; these are the same two
 ends, at the base and at the priors, from which ``studies.hidden_cases`` measures what can be seen.
