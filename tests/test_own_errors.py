@@ -98,7 +98,7 @@ def test_errors_that_cost_more_by_priors_than_they_fell_are_no_better(windows):
     assert better_of(fit, dear) is fit
 
 
-def test_fits_are_compared_by_each_output_and_not_by_the_one_with_most_samples(windows):
+def test_effective_samples_are_told_by_output_and_are_no_more_than_recorded(windows):
     samples = own_errors.effective_by_output(windows)
 
     assert samples.shape == (len(windows.plant.measured),)

@@ -96,9 +96,10 @@ def refit_from(
 
 
 def refit_shaken(problem: Problem, found: Refit) -> Refit:
-    """A refit, or a lower one from nearer to the priors, or beside it.
+    """A refit, or a lower one from starts of earlier windows, nearer to the priors, or beside it.
 
-    See :mod:`workbench.fitting.pulled_in` and :mod:`workbench.fitting.shaken`.
+    See :mod:`workbench.fitting.continued`, :mod:`workbench.fitting.pulled_in` and
+    :mod:`workbench.fitting.shaken`.
     """
     nearer = pulled_in(continued(found.fit, ITERATIONS), ITERATIONS)
     fit = shaken(continued(nearer, ITERATIONS), ITERATIONS)

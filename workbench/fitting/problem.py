@@ -165,7 +165,7 @@ def pose(
     """Cut, fit and validate.
 
     The fit is made twice, the second time with the error model of the first, and again where that
-    one tells far larger errors; then from starts that earlier windows give and points beside it.
+    one tells far other errors; then from starts that earlier windows give and points beside it.
 
     Raises
     ------
