@@ -10,10 +10,15 @@ import pytest
 from test_diagnosis import bench, nothing
 
 from workbench.diagnosis.addition import add_law
-from workbench.diagnosis.law import empirical_law, with_terms
+from workbench.diagnosis.judge import share_removed
+from workbench.diagnosis.law import _all_there, _by_its_place, _law, empirical_law, with_terms
 from workbench.diagnosis.law_choice import _Secants, _stable, worth_scanning
+from workbench.diagnosis.refit import refit_from
+from workbench.diagnosis.result import LawTerm
 from workbench.diagnosis.scan import scan_catalogue
 from workbench.effects.law_features import Factor, Here, product, written
+from workbench.fitting.gauss_newton import fit_windows
+from workbench.fitting.linearised import Point
 from workbench.fitting.problem import pose
 from workbench.law_scales import scales
 from workbench.plants import PLANTS
@@ -100,6 +105,30 @@ def test_what_the_catalogue_has_a_name_for_is_no_term(force_n, term):
 
 def test_where_nothing_is_missing_there_is_no_law():
     assert law_of(posed(lambda x, v: 0.0 * x)) is None
+
+
+def test_a_law_gets_no_credit_for_a_prior_fit_that_stopped_early():
+    problem = with_terms(posed(lambda x, v: 0.0 * x))
+    base = problem.base
+    off = Point(base.unknowns.clipped(base.point.t + 2.0), base.point.starts)
+    stopped = fit_windows(base.windows, base.unknowns, off, iterations=0)
+    early = replace(problem, base=stopped, base_validation=problem.validated(stopped))
+    sine = next(c for c in early.whole.candidates.values() if c.name == SINE)
+    found = refit_from(early, sine, {**stopped.plant.values, sine.strength: 0.1})
+    drops = found.drop_train, found.drop_validation
+    law = _law(found, [LawTerm(sine, found.fit, found.validation, *drops)])
+
+    assert share_removed(law) > 0.9
+    assert _by_its_place(early, law)
+    assert not _all_there(found.fit, [sine])
+
+
+def test_a_law_that_is_there_is_no_matter_of_its_place():
+    problem = posed(wavy)
+    law = law_of(problem)
+
+    assert not _by_its_place(with_terms(problem), law)
+    assert _all_there(law.fit, [step.candidate for step in law.steps])
 
 
 def secants(gains):

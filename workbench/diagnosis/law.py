@@ -15,14 +15,21 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from workbench.candidate import Candidate
-from workbench.diagnosis.judge import clearly_less, reasons_against, share_removed
+from workbench.diagnosis.judge import (
+    DISTINCT,
+    LEAST_SHARE,
+    clearly_less,
+    reasons_against,
+    share_removed,
+)
 from workbench.diagnosis.law_choice import worth_scanning
 from workbench.diagnosis.law_seed import refitted, seeds
 from workbench.diagnosis.refit import Refit, held_out_drop, refit, refit_shaken, sizes
 from workbench.diagnosis.result import Law, LawTerm, Size, Where
 from workbench.diagnosis.rough import rough_fit
 from workbench.diagnosis.scan import Profile, scan
-from workbench.fitting.problem import Problem, misfit
+from workbench.fitting.gauss_newton import Fit
+from workbench.fitting.problem import Problem, improved_base, misfit
 from workbench.law_range import seen_in
 from workbench.law_scales import scales
 from workbench.plant import Plant
@@ -53,9 +60,24 @@ def empirical_law(
     law = _term_by_term(problem, terms, known, to_beat)
     other = _at_once(problem, terms, where)
     if law is None or other is None:
-        return law or other
-    left, left_by_law = (1.0 - share_removed(each) for each in (other, law))
-    return other if clearly_less(left, left_by_law) else law
+        best = law or other
+    else:
+        left, left_by_law = (1.0 - share_removed(each) for each in (other, law))
+        best = other if clearly_less(left, left_by_law) else law
+    return None if best is None or _by_its_place(problem, best) else best
+
+
+def _by_its_place(problem: Problem, law: Law) -> bool:
+    """True where the plant without the law does nearly as well, fitted from where the law ended.
+
+    Then the prior fit had stopped early, and the law removes hardly more than that.
+    """
+    better = improved_base(problem, [law.fit])
+    if better is None:
+        return False
+    train = (better.base.cost - law.fit.cost) / better.misfit
+    unseen = held_out_drop(better.base_validation, law.validation)
+    return share_removed(replace(law, drop_train=train, drop_validation=unseen)) < LEAST_SHARE
 
 
 def _at_once(problem: Problem, terms: Sequence[Candidate], where: Where | None) -> Law | None:
@@ -71,7 +93,8 @@ def _at_once(problem: Problem, terms: Sequence[Candidate], where: Where | None) 
         gained = found.drop_train - (best.drop_train if best else 0.0)
         more = count - (len(best.steps) if best else 0)
         sound = not reasons_against(problem.base, found, parameters=count)
-        if sound and gained >= more * LEAST_TERM_SHARE:
+        there = _all_there(found.fit, [step.candidate for step in steps])
+        if sound and there and gained >= more * LEAST_TERM_SHARE:
             best = _law(found, [*steps])
     return best
 
@@ -105,6 +128,12 @@ def _term_by_term(
     if best is None:
         return None
     return _law(best, steps)
+
+
+def _all_there(fit: Fit, terms: Iterable[Candidate]) -> bool:
+    """True where each term is distinct from none: one that is not only bends what others do."""
+    found = sizes(fit, tuple(term.strength for term in terms))
+    return all(abs(size.value) >= DISTINCT * size.deviation for size in found.values())
 
 
 def with_terms(problem: Problem) -> Problem:
