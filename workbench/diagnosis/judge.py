@@ -24,7 +24,7 @@ import numpy as np
 
 from workbench.candidate import Candidate
 from workbench.diagnosis.refit import Refit
-from workbench.diagnosis.result import Law, Ranked
+from workbench.diagnosis.result import Law, Ranked, Size
 from workbench.diagnosis.scan import Profile
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.own_errors import effective_by_output
@@ -119,6 +119,11 @@ def _size_reasons(refit: Refit) -> list[str]:
     return [why for each in refit.candidate.singles for why in _reasons_of_size(refit, each)]
 
 
+def distinct(size: Size, null: float = 0.0) -> bool:
+    """True where a fitted size is more than two of its standard deviations from ``null``."""
+    return abs(size.value - null) >= DISTINCT * size.deviation
+
+
 def _reasons_of_size(refit: Refit, candidate: Candidate) -> list[str]:
     name = candidate.strength if candidate.strength in refit.size else candidate.held
     if name not in refit.size:
@@ -129,7 +134,7 @@ def _reasons_of_size(refit: Refit, candidate: Candidate) -> list[str]:
     reasons = []
     if abs(size - null) < LEAST_SIZE * abs(known.typical):
         reasons.append("its size is negligible")
-    elif abs(size - null) < DISTINCT * refit.size[name].deviation:
+    elif not distinct(refit.size[name], null):
         reasons.append("its size is not distinct from none")
     ends = (end for end in (known.lower, known.upper) if end not in (null, known.typical))
     if any(isclose(size, end, rel_tol=AT_BOUND, abs_tol=0.0) for end in ends):

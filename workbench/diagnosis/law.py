@@ -16,9 +16,9 @@ from dataclasses import replace
 
 from workbench.candidate import Candidate
 from workbench.diagnosis.judge import (
-    DISTINCT,
     LEAST_SHARE,
     clearly_less,
+    distinct,
     reasons_against,
     share_removed,
 )
@@ -93,8 +93,8 @@ def _at_once(problem: Problem, terms: Sequence[Candidate], where: Where | None) 
         gained = found.drop_train - (best.drop_train if best else 0.0)
         more = count - (len(best.steps) if best else 0)
         sound = not reasons_against(problem.base, found, parameters=count)
-        there = _all_there(found.fit, [step.candidate for step in steps])
-        if sound and there and gained >= more * LEAST_TERM_SHARE:
+        enough = gained >= more * LEAST_TERM_SHARE
+        if sound and enough and _all_there(found.fit, [step.candidate for step in steps]):
             best = _law(found, [*steps])
     return best
 
@@ -132,8 +132,7 @@ def _term_by_term(
 
 def _all_there(fit: Fit, terms: Iterable[Candidate]) -> bool:
     """True where each term is distinct from none: one that is not only bends what others do."""
-    found = sizes(fit, tuple(term.strength for term in terms))
-    return all(abs(size.value) >= DISTINCT * size.deviation for size in found.values())
+    return all(map(distinct, sizes(fit, tuple(term.strength for term in terms)).values()))
 
 
 def with_terms(problem: Problem) -> Problem:
