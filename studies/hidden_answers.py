@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import replace
-from math import nan
+from math import isnan, nan
 from time import monotonic
 
 from studies.hidden_benches import Bench, bench_of
@@ -14,7 +14,11 @@ from studies.hidden_tasks import Task
 from workbench.diagnosis.addition import Addition, accept, assembled
 from workbench.diagnosis.improve import improve
 from workbench.diagnosis.improvement import Improvement
+from workbench.diagnosis.refit import refit, refit_shaken
 from workbench.diagnosis.result import Diagnosis, Verdict
+from workbench.diagnosis.rough import rough_fit
+from workbench.diagnosis.scan import scan
+from workbench.fitting.problem import pose
 from workbench.rig import Rig
 
 MOST_DIFFERENCES = 3
@@ -34,6 +38,8 @@ def answered(task: Task, recorded: Recorded) -> Row:
         if task.kind in (Kind.LAW, Kind.NOTHING):
             said = beyond_differences(said, rig, recorded)
         row = row_of(task, said)
+        if task.kind is Kind.EFFECT and isnan(row.own_drop):
+            row = replace(row, own_drop=own_drop(said, rig, recorded))
     return replace(row, seconds=monotonic() - begun)
 
 
@@ -80,6 +86,23 @@ def row_of(task: Task, said: Answer) -> Row:
         balance=balance,
         balance_right=balance in bench.laws.get(case.hidden or "", ()),
     )
+
+
+def own_drop(said: Answer, rig: Rig, recorded: Recorded) -> float:
+    """Share of the misfit that the hidden effect removes, where the diagnosis did not refit it.
+
+    What no recording shows is not refitted, but neither is what stands behind many that do the
+    same: only its own refit tells whether it can be seen.
+    """
+    train, held_out = recorded
+    base, name = said.diagnosis.base, bench_of(said.case).public_name(said.case)
+    problem = pose(rig, [train], [held_out]).with_base(base)
+    candidates = [c for c in problem.whole.candidates.values() if c.name == name]
+    profiles = scan(
+        problem.whole, base.windows, base.unknowns, base.point, candidates, base.derivatives
+    )
+    found = [refit(problem, rough_fit(problem, profile)) for profile in profiles]
+    return max((refit_shaken(problem, each).drop_train for each in found), default=nan)
 
 
 def _balance(diagnosis: Diagnosis) -> str:

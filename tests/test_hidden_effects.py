@@ -9,8 +9,8 @@ from functools import cache
 
 import pytest
 
-from studies.hidden_answers import row_of
-from studies.hidden_benches import SERVO_DRIVE
+from studies.hidden_answers import own_drop, row_of
+from studies.hidden_benches import BENCHES, SERVO_DRIVE
 from studies.hidden_effects import answer, recordings
 from studies.hidden_rows import Kind, table
 from studies.hidden_tasks import Task
@@ -141,3 +141,16 @@ def test_the_user_s_rig_lacks_what_is_hidden():
 
     assert rig.plant.values["friction.coulomb_force_n"] == 0.0
     assert SERVO_DRIVE.user_rig(CASES[None, SEED]).plant.values["friction.coulomb_force_n"] > 0.0
+
+
+@pytest.mark.slow
+def test_whether_a_hidden_effect_can_be_seen_does_not_hang_on_whether_it_was_refitted():
+    """An effect that no diagnosis followed is refitted by the study, as the diagnosis would."""
+    bench = BENCHES["soft_joint"]
+    case = read_cases(bench.truth.stored)["chamber_leak", SEED]
+    (recorded,) = recordings([case])
+    said = answer(case, *recorded)
+    refitted = row_of(Task(Kind.EFFECT, (case,)), said).own_drop
+
+    assert refitted > 0.5
+    assert own_drop(said, bench.user_rig(case), recorded) == pytest.approx(refitted, rel=0.05)
