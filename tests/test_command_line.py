@@ -279,3 +279,13 @@ def test_options_take_several_values_in_a_row_behind_the_arguments():
     assert spread(["rig", "a", "--validate=b", "c", "-o", "d"], several) == [
         "rig", "a", "--validate=b", "--validate", "c", "-o", "d",
     ]  # fmt: skip
+
+
+def test_a_flag_that_stands_first_swallows_nothing_and_hinders_no_list():
+    """``-q`` has no value: what follows it is the first argument."""
+    several, flags = {"--validate"}, {"-q", "--quiet"}
+
+    assert spread(["-q", "rig", "a", "--validate", "b", "c"], several, flags) == [
+        "-q", "rig", "a", "--validate", "b", "--validate", "c",
+    ]  # fmt: skip
+    assert spread(["-q", "-o", "d", "rig", "--validate", "b", "c"], several, flags)[-1] == "c"

@@ -8,7 +8,8 @@ from test_diagnosis import bench, coulomb
 
 from studies.text_of_results import moved_text
 from workbench.comparison.regimes import regimes
-from workbench.diagnosis.diagnose import _followed, diagnose, silent
+from workbench.diagnosis.diagnose import diagnose, silent
+from workbench.diagnosis.follow import follow
 from workbench.diagnosis.improve import add, improve
 from workbench.diagnosis.judge import (
     SHARE_REASON,
@@ -38,7 +39,7 @@ def problem():
 
 @pytest.fixture(scope="module")
 def followed(problem):
-    return _followed(problem, None, silent)
+    return follow(problem, None, silent)
 
 
 @pytest.fixture(scope="module")

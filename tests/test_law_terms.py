@@ -9,12 +9,15 @@ import numpy as np
 import pytest
 from test_diagnosis import bench, nothing
 
-from workbench.diagnosis.addition import add_law
-from workbench.diagnosis.judge import share_removed
-from workbench.diagnosis.law import _all_there, _by_its_place, _law, empirical_law, with_terms
+from workbench.diagnosis import addition
+from workbench.diagnosis import diagnose as diagnosing
+from workbench.diagnosis.addition import NO_LAW, add_law
+from workbench.diagnosis.diagnose import diagnose
+from workbench.diagnosis.judge import distinct, share_removed
+from workbench.diagnosis.law import _at_once, _law, better_base, empirical_law, standing, with_terms
 from workbench.diagnosis.law_choice import _Secants, _stable, worth_scanning
 from workbench.diagnosis.refit import refit_from
-from workbench.diagnosis.result import LawTerm
+from workbench.diagnosis.result import LawTerm, Size, Verdict
 from workbench.diagnosis.scan import scan_catalogue
 from workbench.effects.law_features import Factor, Here, product, written
 from workbench.fitting.gauss_newton import fit_windows
@@ -43,9 +46,13 @@ def wavy(x, v):
     return WAVE_N * np.sin(2 * np.pi * x / STROKE_M)
 
 
+def recorded(force_n):
+    """What is trained and what is held out."""
+    return [made(1, force_n), made(3, force_n, 1e5)], [made(2, force_n, 4e5)]
+
+
 def posed(force_n):
-    train = [made(1, force_n), made(3, force_n, 1e5)]
-    return pose(load_rig(BARE), train, [made(2, force_n, 4e5)])
+    return pose(load_rig(BARE), *recorded(force_n))
 
 
 def law_of(problem):
@@ -107,28 +114,96 @@ def test_where_nothing_is_missing_there_is_no_law():
     assert law_of(posed(lambda x, v: 0.0 * x)) is None
 
 
-def test_a_law_gets_no_credit_for_a_prior_fit_that_stopped_early():
-    problem = with_terms(posed(lambda x, v: 0.0 * x))
+def stopped_early(problem, deviations=2.0):
+    """The same with a prior fit that lies so many prior deviations from its best place."""
     base = problem.base
-    off = Point(base.unknowns.clipped(base.point.t + 2.0), base.point.starts)
-    stopped = fit_windows(base.windows, base.unknowns, off, iterations=0)
-    early = replace(problem, base=stopped, base_validation=problem.validated(stopped))
-    sine = next(c for c in early.whole.candidates.values() if c.name == SINE)
-    found = refit_from(early, sine, {**stopped.plant.values, sine.strength: 0.1})
+    off = Point(base.unknowns.clipped(base.point.t + deviations), base.point.starts)
+    return problem.with_base(fit_windows(base.windows, base.unknowns, off, iterations=0))
+
+
+def law_with(problem, name):
+    """The law of one term, fitted from a tenth of a newton."""
+    problem = with_terms(problem)
+    term = next(c for c in problem.whole.candidates.values() if c.name == name)
+    found = refit_from(problem, term, {**problem.base.plant.values, term.strength: 0.1})
     drops = found.drop_train, found.drop_validation
-    law = _law(found, [LawTerm(sine, found.fit, found.validation, *drops)])
+    return _law(found, [LawTerm(term, found.fit, found.validation, *drops)])
+
+
+def asked_first_at(monkeypatch, module, problem, law):
+    """Lets a module pose such a problem and find such a law in it; further ones are its own.
+
+    Returns the problems in which a law is sought, one after the other.
+    """
+    asked = []
+
+    def found(problem, *known, **more):
+        asked.append(problem)
+        return law if len(asked) == 1 else empirical_law(problem, *known, **more)
+
+    monkeypatch.setattr(module, "pose", lambda *_: problem)
+    monkeypatch.setattr(module, "empirical_law", found)
+    return asked
+
+
+def test_a_law_gets_no_credit_for_a_prior_fit_that_stopped_early(monkeypatch):
+    def nothing_missing(x, v):
+        return 0.0 * x
+
+    early = stopped_early(posed(nothing_missing))
+    law = law_with(early, SINE)
+    asked_first_at(monkeypatch, addition, early, law)
 
     assert share_removed(law) > 0.9
-    assert _by_its_place(early, law)
-    assert not _all_there(found.fit, [sine])
+    assert better_base(early, law).base.cost < early.base.cost - 0.9 * early.misfit
+    assert standing(early, law) is None
+    with pytest.raises(ValueError, match=NO_LAW):
+        add_law(load_rig(BARE), *recorded(nothing_missing))
 
 
-def test_a_law_that_is_there_is_no_matter_of_its_place():
+def test_a_law_that_is_there_counts_from_the_better_prior_fit_that_it_found(monkeypatch):
     problem = posed(wavy)
+    early = stopped_early(problem, 15.0)
+    asked = asked_first_at(monkeypatch, addition, early, law_with(early, SINE))
     law = law_of(problem)
+    (step,) = add_law(load_rig(BARE), *recorded(wavy))
+    first, then = (each.base.cost for each in asked)
 
-    assert not _by_its_place(with_terms(problem), law)
-    assert _all_there(law.fit, [step.candidate for step in law.steps])
+    assert standing(problem, law) is law
+    assert step.candidate.name == SINE
+    assert then == pytest.approx(problem.base.cost, rel=1e-3) and first > then + 0.03 * then
+
+
+def test_a_diagnosis_begins_again_from_the_prior_fit_that_a_law_found(monkeypatch):
+    problem = posed(wavy)
+    early = stopped_early(problem, 15.0)
+    asked = asked_first_at(monkeypatch, diagnosing, early, law_with(early, SINE))
+    monkeypatch.setattr(diagnosing, "improved_base", lambda *_: None)  # refits find nothing here
+    found = diagnose(load_rig(BARE), *recorded(wavy))
+
+    assert found.verdict is Verdict.NOT_IN_CATALOGUE
+    assert len(asked) == 2
+    assert found.base.cost == pytest.approx(problem.base.cost, rel=1e-3)
+    assert [*found.law.terms] == [f"{SINE}.size_n"]
+
+
+def test_each_term_of_a_law_that_is_read_off_is_there(monkeypatch):
+    """A term that is not only bends what the others do."""
+    problem = with_terms(posed(wavy))
+    terms = {c.name: c for c in problem.whole.candidates.values()}
+    sine, curved = terms[SINE], terms[CURVED]
+    both = {sine.strength: WAVE_N, curved.strength: 0.0}
+    asked = [((curved,), {curved.strength: 1.0}), ((curved, sine), both)]
+    monkeypatch.setattr("workbench.diagnosis.law.seeds", lambda *_: asked)
+
+    assert _at_once(problem, [sine, curved], None) is None
+    monkeypatch.setattr("workbench.diagnosis.law.seeds", lambda *_: [((sine,), both), asked[1]])
+    assert [*_at_once(problem, [sine, curved], None).terms] == [sine.strength]
+
+
+def test_what_is_at_a_bound_has_no_deviation_that_could_refuse_it():
+    assert distinct(Size(1.0, float("nan"))) and distinct(Size(1.0, 0.5))
+    assert not distinct(Size(1.0, 0.6)) and not distinct(Size(1.0, 0.2), null=0.9)
 
 
 def secants(gains):

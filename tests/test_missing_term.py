@@ -18,7 +18,7 @@ from workbench.diagnosis.dependence import (
     parameter_columns,
     side,
 )
-from workbench.diagnosis.missing_term import Course, Intensities
+from workbench.diagnosis.missing_term import Course, Dependence, Intensities
 from workbench.diagnosis.suspects import with_missing_flows
 from workbench.fitting.unknowns import nominal_unknowns
 from workbench.plants import PLANTS
@@ -176,8 +176,26 @@ def test_the_figure_shows_both_ways_and_both_intensities(looping):
     ]  # fmt: skip
     assert "a loop" in first.get_title() and "a loop" not in second.get_title()
     labels = [text.get_text() for text in first.get_legend().get_texts()]
-    assert labels == ["valve command rising", "valve command falling"]
+    assert labels == ["one deviation in each bin", "valve command rising", "valve command falling"]
     assert len(second.lines) == 3  # mean, the other intensity, zero
+
+
+def test_a_missing_force_is_always_drawn_against_velocity_and_a_flow_against_a_command():
+    where = diagnosis().where
+    bins = np.array([[0.0, 1.0], [1.0, 2.0], [0.1, 0.1]])
+    names = (
+        "chamber_b.pressure_pa", "chamber_a.pressure_pa", "slide.position_m",
+        "rate of valve.command_v", "valve.command_v", "slide.velocity_m_s",
+    )  # fmt: skip
+    against = tuple(Dependence(name, 0.6 - 0.1 * k, bins) for k, name in enumerate(names))
+
+    def drawn(balance, term):
+        found = replace(where, balance=balance, term_name=term, against=against)
+        return [axes.get_xlabel() for axes in missing_term_figure(found).axes[2:]]
+
+    assert drawn("slide.momentum", "force_n")[-1] == "slide velocity (m/s)"
+    assert drawn("chamber_a.mass", "mass_flow_kg_s")[-1] == "valve command (V)"
+    assert len(drawn("slide.momentum", "force_n")) == 3
 
 
 def test_what_is_not_known_of_a_missing_term_has_no_line():

@@ -133,6 +133,8 @@ def test_what_breaks_a_limit_is_said():
 
     assert found.broken_by(sound, ends=False) == ""
     assert "pressure above" in found.broken_by(with_(A, np.full(100, 9e5)), ends=False)
+    assert "pressure above" in found.broken_by(with_(A, np.full(100, np.nan)), ends=False)
+    assert "leaves" in found.broken_by(with_(PLACE, np.full(100, np.nan)), ends=False)
     far = with_(PLACE, np.full(100, 0.2))
     assert "leaves" in found.broken_by(far, ends=False)
     assert found.broken_by(far, ends=True) == ""

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from test_judgement import BARE, HELD_OUT, TRAIN, named, unsure
 
-from workbench.diagnosis.diagnose import _followed, silent
+from workbench.diagnosis.diagnose import silent
+from workbench.diagnosis.follow import follow
 from workbench.diagnosis.judge import (
     HELD_OUT_REASON,
     SHARE_REASON,
@@ -29,7 +30,7 @@ def problem():
 
 @pytest.fixture(scope="module")
 def followed(problem):
-    return _followed(problem, None, silent)
+    return follow(problem, None, silent)
 
 
 @pytest.fixture(scope="module")

@@ -8,13 +8,13 @@ import shlex
 import sys
 import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from typer.core import TyperCommand
+from typer.core import TyperCommand, TyperOption
 
 if TYPE_CHECKING:
     from studies.workers import Workers
@@ -35,23 +35,26 @@ app = typer.Typer(
 class Spread(TyperCommand):
     """A command whose options take several values in a row: ``--validate a.csv b.csv``.
 
-    Only behind an argument, so that options that stand first do not swallow the arguments.
+    Only behind an argument, so that options that stand first do not swallow the arguments; flags
+    that stand first have none to swallow.
     """
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        several = {name for p in self.params if p.multiple for name in p.opts}
-        return super().parse_args(ctx, spread(args, several))
+        options = [p for p in self.params if isinstance(p, TyperOption)]
+        several = {name for p in options if p.multiple for name in p.opts}
+        flags = {name for p in options if p.is_flag for name in (*p.opts, *p.secondary_opts)}
+        return super().parse_args(ctx, spread(args, several, flags))
 
 
-def spread(args: list[str], several: set[str]) -> list[str]:
+def spread(args: list[str], several: set[str], flags: Collection[str] = ()) -> list[str]:
     """Repeat an option before each of its further values."""
     found: list[str] = []
+    first = next((arg for arg in args if arg not in flags), "-")
     current = ""
     for arg in args:
         if arg.startswith("-"):
-            behind = bool(found) and not found[0].startswith("-")
             name = arg.partition("=")[0]  # --validate=a.csv
-            current = name if name in several and behind else ""
+            current = name if name in several and not first.startswith("-") else ""
             found.append(arg)
         elif current and found[-1] != current:
             found += [current, arg]

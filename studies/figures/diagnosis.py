@@ -95,8 +95,11 @@ def _ranked_name(name: str, tied: set[str]) -> str:
 
 
 def missing_term_figure(where: Where) -> Figure:
-    """Gain by balance, the missing term in time, and against what drives it most."""
-    strongest = [d for d in where.against if d.bins.shape[1]][:SHOWN_DRIVERS]
+    """Gain by balance, the missing term in time, and against what drives it most.
+
+    One panel is always the usual one: a force against velocity, a flow against a command.
+    """
+    strongest = _panels(where)
     with styled():
         figure = new_figure(PAGE_IN, 4.0 if strongest else 1.8)
         rows = figure.add_gridspec(2 if strongest else 1, 1)
@@ -105,8 +108,31 @@ def missing_term_figure(where: Where) -> Figure:
         _draw_balances(figure.add_subplot(above[1]), where)
         below = rows[1].subgridspec(1, len(strongest)) if strongest else ()
         for k, dependence in enumerate(strongest):
-            _draw_dependence(figure.add_subplot(below[k]), where, dependence)
+            axes = figure.add_subplot(below[k])
+            _draw_dependence(axes, where, dependence)
+            if k == 0 and not dependence.memory:
+                _leave_room(axes, 0.25)
+                axes.legend(loc="upper left")
     return figure
+
+
+def _panels(where: Where) -> list[Dependence]:
+    """What the term follows most, and the variable that engineers look for first."""
+    drawable = [each for each in where.against if each.bins.shape[1]]
+    place, _, kind = where.balance.rpartition(".")
+    velocity = f"{place}.velocity_m_s"
+    usual = [
+        each
+        for each in drawable
+        if (each.variable == velocity if kind == "momentum" else _is_command(each.variable))
+    ]
+    others = [each for each in drawable if each is not next(iter(usual), None)]
+    chosen = [*others[: SHOWN_DRIVERS - len(usual[:1])], *usual[:1]]
+    return [each for each in drawable if any(each is one for one in chosen)]
+
+
+def _is_command(variable: str) -> bool:
+    return ".command" in variable and not variable.startswith("rate of ")
 
 
 def _term(where: Where) -> tuple[float, str]:
@@ -154,7 +180,8 @@ def _draw_dependence(axes: Axes, where: Where, dependence: Dependence) -> None:
     plain = name.removeprefix("rate of ")
     per = 1.0 / display_scale(plain).factor
     centres, means, spreads = dependence.bins * np.array([[per], [factor], [factor]])
-    axes.fill_between(centres, means - spreads, means + spreads, color=BLUE, alpha=0.2, linewidth=0)
+    band = {"color": BLUE, "alpha": 0.2, "linewidth": 0, "label": "one deviation in each bin"}
+    axes.fill_between(centres, means - spreads, means + spreads, **band)
     loop = dependence.memory
     if loop:
         _draw_loop(axes, loop, per, factor)

@@ -11,7 +11,7 @@ from workbench.consistency import checked
 from workbench.diagnosis.absent import is_new
 from workbench.diagnosis.diagnose import Progress, silent
 from workbench.diagnosis.evidence import WARNINGS, Recordings, held_out, weighed
-from workbench.diagnosis.law import empirical_law, plant_with_terms
+from workbench.diagnosis.law import better_base, empirical_law, plant_with_terms, standing
 from workbench.diagnosis.pairs import pair_fit
 from workbench.diagnosis.refit import Refit, refit, refit_shaken
 from workbench.diagnosis.result import Diagnosis, Evidence, Law, Ranked, told
@@ -136,7 +136,14 @@ def add_law(
     progress("prior fit")
     problem = pose(rig, train, validation)
     progress("empirical law")
-    law = empirical_law(problem, scan_catalogue(problem), where=locate(problem, train))
+    where = locate(problem, train)
+    law = empirical_law(problem, scan_catalogue(problem), where=where)
+    better = better_base(problem, law)
+    if better:
+        progress("the prior fit is improved by what the law found: once more")
+        problem = better
+        law = empirical_law(problem, scan_catalogue(problem), where=where)
+        law = standing(problem, law)
     if law is None:
         raise ValueError(f"{rig.name}: {NO_LAW}")
     evidence = weighed(evidence, problem.base_validation)

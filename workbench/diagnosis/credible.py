@@ -39,9 +39,11 @@ def credible(found: Diagnosis, doubts: Sequence[Finding]) -> Diagnosis:
             next_recording=None,
             contradicted=True,
         )
-    if found.verdict is Verdict.FOUND and any(each.weight is Weight.DOUBT for each in doubts):
+    sure = found.verdict in (Verdict.FOUND, Verdict.NOT_IN_CATALOGUE)
+    if sure and any(each.weight is Weight.DOUBT for each in doubts):
+        verdict = Verdict.TIE if found.verdict is Verdict.FOUND else found.verdict
         sentence = f"{found.sentence}, if the recording can be trusted"
-        return replace(found, verdict=Verdict.TIE, sentence=sentence)
+        return replace(found, verdict=verdict, sentence=sentence)
     return found
 
 

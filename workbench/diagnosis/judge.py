@@ -120,8 +120,12 @@ def _size_reasons(refit: Refit) -> list[str]:
 
 
 def distinct(size: Size, null: float = 0.0) -> bool:
-    """True where a fitted size is more than two of its standard deviations from ``null``."""
-    return abs(size.value - null) >= DISTINCT * size.deviation
+    """True where a fitted size is no less than two of its standard deviations from ``null``.
+
+    At a bound there is no deviation (NaN) and nothing to refuse: a lag that is all there ends at
+    the whole of itself, and bounds that a size may not reach have a criterion of their own.
+    """
+    return not abs(size.value - null) < DISTINCT * size.deviation
 
 
 def _reasons_of_size(refit: Refit, candidate: Candidate) -> list[str]:

@@ -13,10 +13,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from math import nan
 
 from workbench.candidate import Candidate
 from workbench.diagnosis.judge import (
-    LEAST_SHARE,
     clearly_less,
     distinct,
     reasons_against,
@@ -24,7 +24,14 @@ from workbench.diagnosis.judge import (
 )
 from workbench.diagnosis.law_choice import worth_scanning
 from workbench.diagnosis.law_seed import refitted, seeds
-from workbench.diagnosis.refit import Refit, held_out_drop, refit, refit_shaken, sizes
+from workbench.diagnosis.refit import (
+    Refit,
+    counted_from,
+    held_out_drop,
+    refit,
+    refit_shaken,
+    sizes,
+)
 from workbench.diagnosis.result import Law, LawTerm, Size, Where
 from workbench.diagnosis.rough import rough_fit
 from workbench.diagnosis.scan import Profile, scan
@@ -60,24 +67,29 @@ def empirical_law(
     law = _term_by_term(problem, terms, known, to_beat)
     other = _at_once(problem, terms, where)
     if law is None or other is None:
-        best = law or other
-    else:
-        left, left_by_law = (1.0 - share_removed(each) for each in (other, law))
-        best = other if clearly_less(left, left_by_law) else law
-    return None if best is None or _by_its_place(problem, best) else best
+        return law or other
+    left, left_by_law = (1.0 - share_removed(each) for each in (other, law))
+    return other if clearly_less(left, left_by_law) else law
 
 
-def _by_its_place(problem: Problem, law: Law) -> bool:
-    """True where the plant without the law does nearly as well, fitted from where the law ended.
+def better_base(problem: Problem, law: Law | None) -> Problem | None:
+    """The problem with a better prior fit, where the fit of its law found one; None where not.
 
-    Then the prior fit had stopped early, and the law removes hardly more than that.
+    Then the prior fit had stopped early, what the law removes is partly that, and whoever asked
+    for it asks again from there.
     """
-    better = improved_base(problem, [law.fit])
-    if better is None:
-        return False
-    train = (better.base.cost - law.fit.cost) / better.misfit
-    unseen = held_out_drop(better.base_validation, law.validation)
-    return share_removed(replace(law, drop_train=train, drop_validation=unseen)) < LEAST_SHARE
+    return improved_base(problem, [law.fit]) if law else None
+
+
+def standing(problem: Problem, law: Law | None) -> Law | None:
+    """A law that passes every criterion from each prior fit that it leads to as well, or None."""
+    better = better_base(problem, law)
+    if law is None or better is None:
+        return law
+    last = law.steps[-1].candidate
+    found = Refit(last, law.fit, law.validation, law.terms, nan, nan, nan)
+    counted = counted_from(better.base, better.base_validation, found)
+    return None if reasons_against(better.base, counted, parameters=len(law.terms)) else law
 
 
 def _at_once(problem: Problem, terms: Sequence[Candidate], where: Where | None) -> Law | None:
@@ -103,9 +115,9 @@ def _term_by_term(
     problem: Problem, terms: list[Candidate], known: Sequence[Profile], to_beat: float
 ) -> Law | None:
     """The law that grows by the term that the windows choose."""
-    first = problem
+    first, before = problem, problem.base_validation
     steps: list[LawTerm] = []
-    best: Refit | None = None
+    best: Law | None = None
     for _ in range(MOST_TERMS):
         # What has a name at the base has none to offer on top of a term that imitates it either.
         terms = [term for term in terms if term not in problem.added]
@@ -117,17 +129,16 @@ def _term_by_term(
         counted = _counted_from(first, found)
         if reasons_against(first.base, counted, parameters=len(steps) + 1):
             break
-        before = best.validation if best else first.base_validation
         unseen = held_out_drop(before, found.validation)
         steps.append(
             LawTerm(found.candidate, found.fit, found.validation, found.drop_train, unseen)
         )
-        best = counted
+        before = found.validation
+        if _all_there(found.fit, [step.candidate for step in steps]):
+            best = _law(counted, [*steps])
         # The next term is scanned at this fit, and its drop still counts from the first base.
         problem = replace(problem, added=(*problem.added, found.candidate), base=found.fit)
-    if best is None:
-        return None
-    return _law(best, steps)
+    return best
 
 
 def _all_there(fit: Fit, terms: Iterable[Candidate]) -> bool:

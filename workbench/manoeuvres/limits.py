@@ -88,7 +88,8 @@ class Limits:
         ``ends`` where the manoeuvre is meant to reach the stops.
         """
         pressures = [v for name, v in predicted.channels.items() if name.endswith("pressure_pa")]
-        if any(values.max() > self.highest_pa for values in pressures):
+        # What could not be simulated (NaN) keeps no limit.
+        if not all(values.max() <= self.highest_pa for values in pressures):
             return f"a pressure above {1e-5 * self.highest_pa:.1f} bar"
         for axis in self.axes:
             values = predicted[axis.output]
@@ -96,10 +97,10 @@ class Limits:
             low, high = max(axis.stops[0], axis.low - room), min(axis.stops[1], axis.high + room)
             if ends and isfinite(axis.stops[1] - axis.stops[0]):
                 low, high = axis.stops[0] - DEEP_M, axis.stops[1] + DEEP_M
-            if values.min() < low or values.max() > high:
+            if not (low <= values.min() and values.max() <= high):
                 return f"{name} leaves {low:.3g} to {high:.3g}"
             fastest = (GENTLE if ends else FASTER) * axis.speed
-            if _fastest(values, self.sample_time_s) > fastest:
+            if not _fastest(values, self.sample_time_s) <= fastest:
                 return f"{name} is faster than {fastest:.3g} per second"
         return ""
 
