@@ -81,7 +81,10 @@ def where_text(found: Diagnosis) -> str:
     follows = [f"{public_name(d.variable)} {percent(d.explains)}" for d in where.against[:3]]
     if not where.certain:
         lines.append(f"which is hardly more than chance: below {LEAST_GAIN:g} none is to be blamed")
-    elif follows:
+    elif where.alike:
+        others = " or ".join(where.alike)
+        lines.append(f"which of them lacks something is not told: {where.balance}, or {others}")
+    if where.certain and follows:
         lines.append(f"missing term of {where.balance} follows {', '.join(follows)}")
         lines += [] if where.memory is None else [_memory_text(*where.memory)]
     shares = [f"{name} {percent(share)}" for name, share in where.by_regime.items()][:4]

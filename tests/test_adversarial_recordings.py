@@ -281,11 +281,24 @@ def assert_unnamed(found):
 
 
 @pytest.mark.slow
-def test_a_stuck_sensor_leads_to_nothing_certain(demo):
+@pytest.mark.parametrize("sensor", [PLACE, A])
+def test_a_stuck_sensor_leads_to_nothing_certain(demo, sensor):
     """The demo's hidden effect may still come first, but it is not called found."""
     rig, *recordings = demo
-    train, validation = (spoil.stuck(PLACE, 3.0)(each).part(0, 5000) for each in recordings)
+    train, validation = (spoil.stuck(sensor, 3.0)(each).part(0, 5000) for each in recordings)
     found = diagnose(rig, [train], [validation], most_windows=12)
 
     assert found.verdict is not Verdict.FOUND
+    assert found.law is None or found.sentence.endswith("if the recording can be trusted")
     assert any("stuck" in each for each in found.warnings)
+
+
+@pytest.mark.slow
+def test_an_uneven_clock_hides_no_effect_and_makes_none(demo):
+    rig, *recordings = demo
+    uneven = (spoil.SERVO_DRIVE["clock jitter"](each).part(0, 5000) for each in recordings)
+    train, validation = uneven
+    found = diagnose(rig, [train], [validation], most_windows=12)
+
+    assert found.ranking[0].candidate.name == "piston_leak"
+    assert found.verdict in (Verdict.FOUND, Verdict.TIE)

@@ -72,6 +72,13 @@ def test_a_size_of_one_deviation_is_not_accepted(problem, sound):
     assert reasons_against(problem.base, unsure(sound)) == ("its size is not distinct from none",)
 
 
+def test_a_size_at_the_whole_of_itself_has_no_deviation_and_is_not_refused_for_that(problem, sound):
+    """So a lag of a sensor ends that is all there: its typical size is its bound."""
+    whole = {name: Size(size.value, np.nan) for name, size in sound.size.items()}
+
+    assert reasons_against(problem.base, replace(sound, size=whole)) == ()
+
+
 def test_an_accepted_row_leads_one_that_fails_a_criterion(problem, followed, sound):
     """Though that one takes twice as much of the error, the verdict is not "nothing missing"."""
     larger = replace(unsure(named(sound, followed, 0)), drop_train=0.99)

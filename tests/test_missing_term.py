@@ -180,6 +180,18 @@ def test_the_figure_shows_both_ways_and_both_intensities(looping):
     assert len(second.lines) == 3  # mean, the other intensity, zero
 
 
+def test_balances_that_gain_alike_but_for_chance_are_told_as_one_question():
+    """As 8.6 over 7.6 of log-likelihood: a factor of three in the odds, which noise makes."""
+    found = diagnosis()
+    gains = {"slide.momentum": 8.6, "chamber_a.mass": 7.6, "chamber_b.mass": 3.0}
+    near = replace(found, where=replace(found.where, balance="slide.momentum", by_balance=gains))
+    far = replace(near, where=replace(near.where, by_balance=gains | {"slide.momentum": 12.0}))
+
+    assert near.where.alike == ("chamber_a.mass",) and far.where.alike == ()
+    assert "not told: slide.momentum, or chamber_a.mass" in diagnosis_text(near, UNITS)
+    assert "not told" not in diagnosis_text(far, UNITS)
+
+
 def test_a_missing_force_is_always_drawn_against_velocity_and_a_flow_against_a_command():
     where = diagnosis().where
     bins = np.array([[0.0, 1.0], [1.0, 2.0], [0.1, 0.1]])
