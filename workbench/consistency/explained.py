@@ -126,7 +126,9 @@ def _motion(windows: Windows, stateless: bool) -> np.ndarray:
 
 def _spread(measured: np.ndarray, stateless: bool) -> np.ndarray:
     """Sum of squares about the mean, of each window or of all, (n_y,)."""
-    about = np.nanmean(measured, axis=(1, 2) if stateless else 2, keepdims=True)
+    axes = (1, 2) if stateless else (2,)
+    seen = np.isfinite(measured).sum(axis=axes, keepdims=True)
+    about = np.nansum(measured, axis=axes, keepdims=True) / np.maximum(seen, 1)
     return np.nansum((measured - about) ** 2, axis=(1, 2))
 
 
