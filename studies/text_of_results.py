@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from workbench.diagnosis.addition import Addition
     from workbench.diagnosis.missing_term import Dependence, Loop
-    from workbench.diagnosis.result import Diagnosis, Law
+    from workbench.diagnosis.result import Diagnosis, Law, Where
     from workbench.fitting.errors import SignalError
     from workbench.fitting.fit import FitReport
     from workbench.fitting.gauss_newton import Fit
@@ -81,8 +81,8 @@ def where_text(found: Diagnosis) -> str:
     follows = [f"{public_name(d.variable)} {percent(d.explains)}" for d in where.against[:3]]
     if not where.certain:
         lines.append(f"which is hardly more than chance: below {LEAST_GAIN:g} none is to be blamed")
-    elif where.alike:
-        others = " or ".join(where.alike)
+    elif _alike(where):
+        others = " or ".join(_alike(where))
         lines.append(f"which of them lacks something is not told: {where.balance}, or {others}")
     if where.certain and follows:
         lines.append(f"missing term of {where.balance} follows {', '.join(follows)}")
@@ -90,6 +90,13 @@ def where_text(found: Diagnosis) -> str:
     shares = [f"{name} {percent(share)}" for name, share in where.by_regime.items()][:4]
     left = f"error left by the prior fit (regimes overlap): {', '.join(shares)}"
     return "\n".join([*lines, *([left] if shares else [])])
+
+
+def _alike(where: Where) -> list[str]:
+    """Other balances that gain as much as the named one, but for what chance gives."""
+    least = max(where.by_balance[where.balance] - LEAST_GAIN, 0.0)
+    gaining = (name for name, gain in where.by_balance.items() if gain > least)
+    return [name for name in gaining if name != where.balance]
 
 
 def strained_text(found: Diagnosis) -> list[str]:

@@ -263,42 +263,7 @@ def test_a_recording_of_another_plant_gets_no_name(crr):
     assert_unnamed(found)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "way", [spoil.SERVO_DRIVE["another command"], spoil.noise(A, B, memory=0.99)]
-)
-def test_what_nothing_explains_gets_no_name(demo, way):
-    rig, *recordings = demo
-    train, validation = (way(each).part(0, 5000) for each in recordings)
-
-    assert_unnamed(diagnose(rig, [train], [validation], most_windows=12))
-
-
 def assert_unnamed(found):
     assert found.verdict is Verdict.RECORDING_TOO_WEAK
     assert found.named is None and found.law is None and found.after == {}
     assert any("nothing explains the recording" in each for each in found.warnings)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("sensor", [PLACE, A])
-def test_a_stuck_sensor_leads_to_nothing_certain(demo, sensor):
-    """The demo's hidden effect may still come first, but it is not called found."""
-    rig, *recordings = demo
-    train, validation = (spoil.stuck(sensor, 3.0)(each).part(0, 5000) for each in recordings)
-    found = diagnose(rig, [train], [validation], most_windows=12)
-
-    assert found.verdict is not Verdict.FOUND
-    assert found.law is None or found.sentence.endswith("if the recording can be trusted")
-    assert any("stuck" in each for each in found.warnings)
-
-
-@pytest.mark.slow
-def test_an_uneven_clock_hides_no_effect_and_makes_none(demo):
-    rig, *recordings = demo
-    uneven = (spoil.SERVO_DRIVE["clock jitter"](each).part(0, 5000) for each in recordings)
-    train, validation = uneven
-    found = diagnose(rig, [train], [validation], most_windows=12)
-
-    assert found.ranking[0].candidate.name == "piston_leak"
-    assert found.verdict in (Verdict.FOUND, Verdict.TIE)

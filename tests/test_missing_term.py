@@ -187,8 +187,7 @@ def test_balances_that_gain_alike_but_for_chance_are_told_as_one_question():
     near = replace(found, where=replace(found.where, balance="slide.momentum", by_balance=gains))
     far = replace(near, where=replace(near.where, by_balance=gains | {"slide.momentum": 12.0}))
 
-    assert near.where.alike == ("chamber_a.mass",) and far.where.alike == ()
-    assert "not told: slide.momentum, or chamber_a.mass" in diagnosis_text(near, UNITS)
+    assert "not told: slide.momentum, or chamber_a.mass\n" in diagnosis_text(near, UNITS)
     assert "not told" not in diagnosis_text(far, UNITS)
 
 

@@ -177,13 +177,6 @@ class Where:
         return self.by_balance.get(self.balance, 0.0) > LEAST_GAIN
 
     @property
-    def alike(self) -> tuple[str, ...]:
-        """Other balances that gain as much as this one, but for what chance gives."""
-        least = self.by_balance.get(self.balance, 0.0) - LEAST_GAIN
-        others = (name for name, gain in self.by_balance.items() if gain > max(least, 0.0))
-        return tuple(name for name in others if name != self.balance)
-
-    @property
     def memory(self) -> tuple[Dependence, Loop] | None:
         """The variable that the term follows most, and the loop it runs there; None without."""
         first = next(iter(self.against), None)

@@ -1,0 +1,45 @@
+"""Diagnoses of spoiled recordings of the demo: none gets a confident wrong name."""
+
+import pytest
+from test_adversarial_recordings import assert_unnamed, demo  # noqa: F401  (demo: a fixture)
+
+from studies import adversarial as spoil
+from workbench.diagnosis.diagnose import diagnose
+from workbench.diagnosis.result import Verdict
+
+A, B, PLACE = spoil.A, spoil.B, spoil.PLACE
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "way", [spoil.SERVO_DRIVE["another command"], spoil.noise(A, B, memory=0.99)]
+)
+def test_what_nothing_explains_gets_no_name(demo, way):  # noqa: F811
+    rig, *recordings = demo
+    train, validation = (way(each).part(0, 5000) for each in recordings)
+
+    assert_unnamed(diagnose(rig, [train], [validation], most_windows=12))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sensor", [PLACE, A])
+def test_a_stuck_sensor_leads_to_nothing_certain(demo, sensor):  # noqa: F811
+    """The demo's hidden effect may still come first, but it is not called found."""
+    rig, *recordings = demo
+    train, validation = (spoil.stuck(sensor, 3.0)(each).part(0, 5000) for each in recordings)
+    found = diagnose(rig, [train], [validation], most_windows=12)
+
+    assert found.verdict is not Verdict.FOUND
+    assert found.law is None or found.sentence.endswith("if the recording can be trusted")
+    assert any("stuck" in each for each in found.warnings)
+
+
+@pytest.mark.slow
+def test_an_uneven_clock_hides_no_effect_and_makes_none(demo):  # noqa: F811
+    rig, *recordings = demo
+    way = spoil.SERVO_DRIVE["clock jitter"]
+    train, validation = (way(each).part(0, 5000) for each in recordings)
+    found = diagnose(rig, [train], [validation], most_windows=12)
+
+    assert found.ranking[0].candidate.name == "piston_leak"
+    assert found.verdict in (Verdict.FOUND, Verdict.TIE)
