@@ -81,8 +81,8 @@ def where_text(found: Diagnosis) -> str:
     follows = [f"{public_name(d.variable)} {percent(d.explains)}" for d in where.against[:3]]
     if not where.certain:
         lines.append(f"which is hardly more than chance: below {LEAST_GAIN:g} none is to be blamed")
-    elif _alike(where):
-        others = " or ".join(_alike(where))
+    elif alike := _alike(where):
+        others = " or ".join(alike)
         lines.append(f"which of them lacks something is not told: {where.balance}, or {others}")
     if where.certain and follows:
         lines.append(f"missing term of {where.balance} follows {', '.join(follows)}")

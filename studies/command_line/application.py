@@ -49,12 +49,12 @@ class Spread(TyperCommand):
 def spread(args: list[str], several: set[str], flags: Collection[str] = ()) -> list[str]:
     """Repeat an option before each of its further values."""
     found: list[str] = []
-    first = next((arg for arg in args if arg not in flags), "-")
+    behind = not next((arg for arg in args if arg not in flags), "-").startswith("-")
     current = ""
     for arg in args:
         if arg.startswith("-"):
             name = arg.partition("=")[0]  # --validate=a.csv
-            current = name if name in several and not first.startswith("-") else ""
+            current = name if name in several and behind else ""
             found.append(arg)
         elif current and found[-1] != current:
             found += [current, arg]

@@ -119,16 +119,14 @@ def missing_term_figure(where: Where) -> Figure:
 def _panels(where: Where) -> list[Dependence]:
     """What the term follows most, and the variable that engineers look for first."""
     drawable = [each for each in where.against if each.bins.shape[1]]
+    strongest = drawable[:SHOWN_DRIVERS]
     place, _, kind = where.balance.rpartition(".")
-    velocity = f"{place}.velocity_m_s"
-    usual = [
-        each
-        for each in drawable
-        if (each.variable == velocity if kind == "momentum" else _is_command(each.variable))
-    ]
-    others = [each for each in drawable if each is not next(iter(usual), None)]
-    chosen = [*others[: SHOWN_DRIVERS - len(usual[:1])], *usual[:1]]
-    return [each for each in drawable if any(each is one for one in chosen)]
+    force, velocity = kind == "momentum", f"{place}.velocity_m_s"
+    names = [each.variable for each in drawable]
+    usual = next((n for n in names if (n == velocity if force else _is_command(n))), None)
+    if usual is None or usual in names[:SHOWN_DRIVERS]:
+        return strongest
+    return [*strongest[:-1], drawable[names.index(usual)]]
 
 
 def _is_command(variable: str) -> bool:

@@ -126,7 +126,7 @@ def _term_by_term(
         found = _refitted(problem, chosen, 0.0 if steps else to_beat)
         if not found or found.drop_train * misfit(problem.base) < LEAST_TERM_SHARE * first.misfit:
             break
-        counted = _counted_from(first, found)
+        counted = counted_from(first.base, first.base_validation, found)
         if reasons_against(first.base, counted, parameters=len(steps) + 1):
             break
         unseen = held_out_drop(before, found.validation)
@@ -173,15 +173,6 @@ def _refitted(problem: Problem, chosen: Sequence[Candidate], to_beat: float) -> 
     if not profiles or profiles[0].drop <= to_beat:
         return None
     return refit_shaken(problem, refit(problem, rough_fit(problem, profiles[0])))
-
-
-def _counted_from(first: Problem, found: Refit) -> Refit:
-    """The same refit with its drop in training counted from the problem before any term.
-
-    Its validation is counted from there already: the held-out base stays that of the problem.
-    """
-    train = (first.base.cost - found.fit.cost) / misfit(first.base)
-    return replace(found, drop_train=train)
 
 
 def _law(best: Refit, steps: list[LawTerm]) -> Law:
