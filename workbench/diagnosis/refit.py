@@ -29,12 +29,15 @@ from workbench.fitting.linearised import Point
 from workbench.fitting.posterior import posterior_deviation
 from workbench.fitting.problem import Problem, misfit
 from workbench.fitting.pulled_in import pulled_in
+from workbench.fitting.resized import points_of_sizes
 from workbench.fitting.shaken import shaken
 from workbench.fitting.start_states import carried
 from workbench.fitting.unknowns import WIDE
 
 ITERATIONS = 10
-PROBES = (0.4, 0.6, 0.8, 0.9, 1.15, 1.4, 1.8, 2.5)  # factors on a fitted strength
+# Factors on a fitted strength or form.  Near break-aways the cost is rough, and a Gauss-Newton step
+# in all unknowns at once may find no way down where a step in the strength alone does.
+PROBES = (0.4, 0.6, 0.8, 0.9, 1.15, 1.4, 1.8, 2.5)
 FIRST_ITERATIONS = 4  # of a shift, before it is followed or left
 FAR_BEHIND = 0.4  # of the best share so far: a shift below it is not followed further
 
@@ -64,7 +67,8 @@ def refit(problem: Problem, begun: Rough) -> Refit:
     base, candidate = problem.base, begun.profile.candidate
     windows, unknowns = begun.fit.windows, begun.fit.unknowns
     names = (candidate.strength, *candidate.forms)
-    start = points_costs(windows, unknowns, _probes(begun.fit, names)).best
+    probes = [begun.fit.point, *points_of_sizes(begun.fit, names, PROBES)]
+    start = points_costs(windows, unknowns, probes).best
     fit = fit_windows(windows, unknowns, start, ITERATIONS)
     if fit.cost > base.cost:  # a poor start: go on from the base, where it is absent
         values = {**windows.plant.values, **base.plant.values}
@@ -104,22 +108,6 @@ def refit_shaken(problem: Problem, found: Refit) -> Refit:
     nearer = pulled_in(continued(found.fit, ITERATIONS), ITERATIONS)
     fit = shaken(continued(nearer, ITERATIONS), ITERATIONS)
     return found if fit is found.fit else _refit(problem, found.candidate, fit, tuple(found.size))
-
-
-def _probes(fit: Fit, names: tuple[str, ...]) -> list[Point]:
-    """The point of a fit and others with another strength or form: a way out of rough places.
-
-    Near break-aways the cost is rough, and a Gauss-Newton step in all unknowns at once may find no
-    way down where a step in the strength alone does.
-    """
-    probes = [fit.point]
-    for row in (fit.unknowns.names.index(name) for name in names if name in fit.unknowns.names):
-        at = fit.unknowns.prior[row] / fit.unknowns.scale[row] + fit.point.t[row]
-        for factor in PROBES:
-            t = fit.point.t.copy()
-            t[row] += (factor - 1.0) * at
-            probes.append(replace(fit.point, t=fit.unknowns.clipped(t)))
-    return probes
 
 
 def refit_shift(problem: Problem, shift: Shift, to_beat: float = 0.0) -> Refit:

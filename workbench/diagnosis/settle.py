@@ -4,7 +4,8 @@ A refit weighs errors as the model without its effect made them.  Its rivals mus
 weights, or their drops could not be compared.  But where the effect was large, windows that show it
 best count least, and what the nominal parameters have moved to imitate it stays with them: sizes
 come out too small.  With weights of its own the fit goes on to where the effect has its size.  The
-drops stay those of the common weights.
+leader's size is then looked for beside it too (:mod:`workbench.fitting.resized`).  The drops stay
+those of the common weights.
 
 Source: diagnosis.md 1.4 (scales from the residuals of the model itself), repeated as in iteratively
 reweighted least squares (Holland and Welsch 1977).
@@ -21,6 +22,7 @@ from workbench.diagnosis.result import Ranked, Size
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.own_errors import weighed_anew
 from workbench.fitting.problem import Problem
+from workbench.fitting.resized import resized
 
 ROUNDS = 4
 STEADY = 0.02  # of a size, by which the last round may still move it
@@ -31,7 +33,9 @@ def with_settled_sizes(problem: Problem, ranking: tuple[Ranked, ...]) -> tuple[R
     leader = ranking[0]
     named = {leader.candidate.name, *leader.tied_with, *leader.crowd}
     return tuple(
-        _settled_row(problem, row) if row.fit and row.candidate.name in named else row
+        _settled_row(problem, row, row is leader)
+        if row.fit and row.candidate.name in named
+        else row
         for row in ranking
     )
 
@@ -49,8 +53,11 @@ def settled(fit: Fit, candidate: Candidate) -> Fit:
     return fit
 
 
-def _settled_row(problem: Problem, row: Ranked) -> Ranked:
+def _settled_row(problem: Problem, row: Ranked, leads: bool) -> Ranked:
     fit = settled(row.fit, row.candidate)
+    if leads:
+        strengths = tuple(each.strength for each in row.candidate.singles)
+        fit = resized(fit, strengths, ITERATIONS)
     size = sizes(fit, tuple(row.size))
     return replace(row, fit=fit, validation=problem.validated(fit), size=size)
 
