@@ -6,12 +6,14 @@ Source: Särkkä 2013, "Bayesian filtering and smoothing", algorithms 5.4 and 8.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import inf
 
 import numpy as np
 
+from workbench.parts import Supply
 from workbench.plant import Plant
 
-TEMPERATURE, MASS = "temperature_k", "mass_kg"
+TEMPERATURE, MASS, PRESSURE = "temperature_k", "mass_kg", "pressure_pa"
 
 
 def predict(
@@ -71,8 +73,9 @@ def smoothed(
 def consistent_start(plant: Plant, known: Mapping[str, float]) -> np.ndarray:
     """The plant's initial state with the known states set, shape (n_x,).
 
-    Gas masses follow, so that each chamber keeps its initial temperature at the new pressure and
-    volume.  Names that are no states, and values that are not finite, are passed over.
+    A chamber whose pressure is not known begins no higher than the highest supply.  Gas masses
+    follow, so that each chamber keeps its initial temperature at the new pressure and volume.
+    Names that are no states, and values that are not finite, are passed over.
     """
     model, (u, d, p) = plant.model, plant.nominal
     x = plant.initial
@@ -81,6 +84,8 @@ def consistent_start(plant: Plant, known: Mapping[str, float]) -> np.ndarray:
     chambers = [owner for owner, _, what in owners if what == MASS and owner in parts]
     temperatures = model.quantities(*(f"{c}.{TEMPERATURE}" for c in chambers))
     before = temperatures(x, u, d, p).full().ravel()
+    for i in (model.states.index(f"{c}.{PRESSURE}") for c in chambers):
+        x[i] = min(x[i], _highest_supply_pa(plant))
     for i, name in enumerate(model.states):
         if np.isfinite(known.get(name, np.nan)):
             x[i] = known[name]
@@ -88,3 +93,9 @@ def consistent_start(plant: Plant, known: Mapping[str, float]) -> np.ndarray:
     for chamber, was, now in zip(chambers, before, after, strict=True):
         x[model.states.index(f"{chamber}.{MASS}")] *= now / was
     return x
+
+
+def _highest_supply_pa(plant: Plant) -> float:
+    """The highest pressure of a supply; no bound where there is none."""
+    supplies = [part.name for part in plant.parts if isinstance(part, Supply)]
+    return max((plant.values[f"{name}.{PRESSURE}"] for name in supplies), default=inf)
