@@ -11,7 +11,7 @@ from scipy.linalg import solve_discrete_are
 
 from controllers.margins import Law
 from controllers.positioning import STATES, PositioningSpec
-from controllers.program_solvers import Answer, Daqp, Solver
+from controllers.program_solvers import Answer, Daqp, Solver, Start
 from controllers.spec import ranged
 from linearize.axes import stroke_m
 from linearize.discrete import sampled
@@ -154,9 +154,9 @@ class Program:
         return Law(np.array([[1.0, 0.0], C]), np.array([error, D]), C, D)
 
     def solved(
-        self, g: np.ndarray, low: np.ndarray, high: np.ndarray, start: np.ndarray | None
-    ) -> Answer:
-        """The optimum z and the solver's iterations, from a start where there is one."""
+        self, g: np.ndarray, low: np.ndarray, high: np.ndarray, start: Start | None
+    ) -> Answer | None:
+        """What the solver finds, from a start where there is one."""
         return self.solver.solved(self, g, low, high, start)
 
     @cached_property

@@ -32,7 +32,7 @@ from controllers.condensed import SLACKS, MpcSpec, Program, limits_of, program_o
 from controllers.margins import Law
 from controllers.motion import PREVIEW
 from controllers.positioning import STATES, Memory, Positioning, Task, positioning
-from controllers.program_solvers import Daqp, Solver
+from controllers.program_solvers import Daqp, Solver, Start
 from controllers.scheduled import Schedule, scheduled
 from linearize.modes import HybridModel
 from linearize.reduction import closed_command
@@ -43,11 +43,23 @@ NONE = np.zeros(SLACKS)  # no limit is violated
 
 @dataclass(frozen=True)
 class Plan:
-    """The last solution: openings ahead (N,), the whole primal z, and the place half-way (m)."""
+    """The last solution.
+
+    openings      those ahead, shape (N,)
+    primal        the whole z
+    place_m       the place half-way
+    multipliers   of the rows; None where no limit was met
+    """
 
     openings: np.ndarray
     primal: np.ndarray
     place_m: float = nan
+    multipliers: np.ndarray | None = None
+
+    @property
+    def start(self) -> Start | None:
+        """Where a solver may begin: what was active is likely to be so a sample later."""
+        return None if self.multipliers is None else Start(self.primal, self.multipliers)
 
     def shifted(self) -> Plan:
         """The same plan a sample later, its last opening held."""
@@ -62,8 +74,9 @@ class LinearMpc:
     Attributes
     ----------
     deadline_s
-        What takes longer is late.  No limit by default, so that a run does not depend on the speed
-        of the machine.
+        What takes longer is late.  That is seen only once the solver has ended, which nothing cuts
+        short: the command is then that of the last plan, but comes as late.  No limit by default,
+        so that a run does not depend on the speed of the machine.
     clock
         Seconds, from any moment on.
     """
@@ -172,10 +185,10 @@ def limited_plan(
 ) -> tuple[Plan, dict[str, float]]:
     """The best plan, started from the last one; without an answer the last one, shifted."""
     n = program.horizon
-    found = program.solved(g, low, high, before.primal if before else None)
+    found = program.solved(g, low, high, before.start if before else None)
     if found:
-        z, iterations = found
-        return Plan(z[:n], z), {"fallback": 0.0, "iterations": float(iterations)}
+        plan = Plan(found.z[:n], found.z, multipliers=found.multipliers)
+        return plan, {"fallback": 0.0, "iterations": float(found.iterations)}
     return (before or steady_plan(n, steady_v)).shifted(), {"fallback": 1.0}
 
 
