@@ -46,6 +46,7 @@ from linearize.reduction import closed_command
 from workbench.contracts import Command, Estimate
 
 PUSHED = np.array([0.0, 1.0, 1.0, -1.0])  # ways of velocity and pressures as the slide is pushed
+ROUNDED = 1e-3  # cost per unit of a slack: multipliers below are rounding of a solver
 NONE = np.zeros(SLACKS)  # no limit is violated
 
 
@@ -66,14 +67,14 @@ class Plan:
 
     def against(self, force: float) -> bool:
         """Whether velocity or pressures are at a limit towards which such a force pushes."""
-        if self.multipliers is None or not force:
+        if self.multipliers is None:
             return False
         n, states = len(self.openings), len(STATES)
         below, above = (
             self.multipliers[n * (1 + side * SLACKS) :][: n * states] for side in (0, 1)
         )
         held = (below + above).reshape(n, states).sum(axis=0)
-        return bool((held * PUSHED * force > 0.0).any())
+        return bool((held * PUSHED * np.sign(force) > ROUNDED).any())
 
     @property
     def start(self) -> Start | None:
