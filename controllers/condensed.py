@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cache, cached_property
 
 import numpy as np
@@ -11,16 +11,18 @@ from scipy.linalg import solve_discrete_are
 
 from controllers.margins import Law
 from controllers.positioning import STATES, PositioningSpec
-from controllers.program_solvers import Answer, Daqp, Solver
+from controllers.program_solvers import Answer, Daqp, Solver, Start
 from controllers.spec import ranged
+from controllers.stacked import pushed_mode, stacked
 from linearize.axes import stroke_m
 from linearize.discrete import sampled
 from linearize.modes import Mode
-from linearize.standard import PRESSURES, SUPPLY, VELOCITY
-from workbench.errors import InputError, Message
+from linearize.standard import SUPPLY
+from workbench.errors import InputError, Message, listed
 from workbench.plant import Plant
 
 SLACK_UNIT = np.array([1e-3, 0.1, 1e4, 1e4])  # m, m/s, Pa, Pa: violations that cost alike
+PRICED = np.array([10.0, 1.0, 1.0, 1.0, 0.1])  # 10 mm, ..., 0.1 V: they have the same price
 SLACKS = len(STATES) + 1  # one per state, and one for the rate of the opening, in V per sample
 LONGEST = 500  # samples ahead; the program is dense, and grows with the square
 
@@ -37,12 +39,18 @@ class MpcSpec:
         Force by which the target pressures shift per integral of the position error.
     margin_m
         The position stays this far from the end stops.
+    lowest_m, below_end_m
+        Soft limits of the position where they are tighter, the upper one as its distance from the
+        end of the stroke.
     lowest_pa, below_supply_pa
         Soft limits of the pressures, the upper one as its distance from the supply pressure.
     fastest_m_s, rate_v_s
         Soft limits of the speed, and of how fast the opening changes.
     slack_weight
-        Cost of violating a limit by 1 mm, 0.1 m/s, 0.1 bar or 1 V per sample.
+        Cost of violating a limit by 1 mm, 0.1 m/s, 0.1 bar or 1 V per sample; grows as the square.
+    slack_price
+        Cost of violating a limit by 10 mm, 0.1 m/s, 0.1 bar or 0.1 V per sample; grows in
+        proportion, so that a limit is kept wherever keeping it costs less.
     """
 
     sample_time_s: float = 2e-3
@@ -54,11 +62,14 @@ class MpcSpec:
     move_v: float = 3.0
     force_n_m_s: float = ranged(5e4)
     margin_m: float = ranged(2e-3)
+    lowest_m: float = ranged(0.0)
+    below_end_m: float = ranged(0.0)
     lowest_pa: float = 1.2e5
     below_supply_pa: float = ranged(1e4)
     fastest_m_s: float = 2.0
     rate_v_s: float = 2.5e3
     slack_weight: float = 1e3
+    slack_price: float = ranged(1e4)
     positioning: PositioningSpec = field(default_factory=PositioningSpec)
 
 
@@ -77,6 +88,7 @@ class Program:
                         shape (2, 4 N)
     openings            smallest and largest opening
     move_v              largest change of the opening from sample to sample, soft
+    slack_price         cost of a violation that grows in proportion
     solver              what solves it at its limits
     """
 
@@ -92,6 +104,7 @@ class Program:
     state_limits: np.ndarray
     openings: tuple[float, float]
     move_v: float
+    slack_price: float = 0.0
     solver: Solver = Daqp()
 
     @property
@@ -107,6 +120,7 @@ class Program:
     ) -> np.ndarray:
         """G for stacked targets (4 N,), the steady opening and the last one."""
         g = np.zeros(len(self.H))
+        g[self.horizon :] = self.slack_price / PRICED
         pull = self.forced.T @ (self.Q @ (unforced - targets))
         g[: self.horizon] = 2.0 * (pull - self.R * steady_v)
         g[0] -= 2.0 * self.S * last_v
@@ -134,6 +148,11 @@ class Program:
         upper = [last, none, high, moved, slack + np.inf]
         return np.concatenate(lower), np.concatenate(upper)
 
+    def unlimited(self, g: np.ndarray) -> np.ndarray:
+        """The optimum without limits, which needs no slack."""
+        openings = -self.inverse[: self.horizon, : self.horizon] @ g[: self.horizon]
+        return np.append(openings, np.zeros(SLACKS))
+
     @cached_property
     def inverse(self) -> np.ndarray:
         """Inverse of H, for the optimum without limits."""
@@ -154,9 +173,9 @@ class Program:
         return Law(np.array([[1.0, 0.0], C]), np.array([error, D]), C, D)
 
     def solved(
-        self, g: np.ndarray, low: np.ndarray, high: np.ndarray, start: np.ndarray | None
-    ) -> Answer:
-        """The optimum z and the solver's iterations, from a start where there is one."""
+        self, g: np.ndarray, low: np.ndarray, high: np.ndarray, start: Start | None
+    ) -> Answer | None:
+        """What the solver finds, from a start where there is one."""
         return self.solver.solved(self, g, low, high, start)
 
     @cached_property
@@ -205,7 +224,8 @@ def program_of(
     move_v = spec.rate_v_s * spec.sample_time_s
     H = cost_of(forced, Q, to_go, R, S, spec.slack_weight)
     rows = rows_of(forced)
-    return Program(H, rows, free, forced, drift, pushed, stages, R, S, ahead, openings, move_v)
+    limited = ahead, openings, move_v, spec.slack_price
+    return Program(H, rows, free, forced, drift, pushed, stages, R, S, *limited)
 
 
 def cost_of(
@@ -251,37 +271,12 @@ def limits_of(plant: Plant, spec: MpcSpec, method: str = "mpc") -> np.ndarray:
         If nothing is left between them.
     """
     highest_pa = float(plant.values[SUPPLY]) - spec.below_supply_pa
-    low = [spec.margin_m, -spec.fastest_m_s, spec.lowest_pa, spec.lowest_pa]
-    high = [stroke_m(plant) - spec.margin_m, spec.fastest_m_s, highest_pa, highest_pa]
+    lowest_m, below_m = (max(spec.margin_m, each) for each in (spec.lowest_m, spec.below_end_m))
+    low = [lowest_m, -spec.fastest_m_s, spec.lowest_pa, spec.lowest_pa]
+    high = [stroke_m(plant) - below_m, spec.fastest_m_s, highest_pa, highest_pa]
     if not np.less(low, high).all():
-        what = f"margin_m {spec.margin_m:g}, lowest_pa {spec.lowest_pa:g} and below_supply_pa "
-        what += f"{spec.below_supply_pa:g} leave no room on {plant.name}"
-        expected = "less than half the stroke and the supply pressure"
-        raise InputError(Message(what, method, expected))
+        names = "margin_m", "lowest_pa", "below_supply_pa", "lowest_m", "below_end_m"
+        what = listed([f"{name} {getattr(spec, name):g}" for name in names])
+        expected = "less than the stroke and the supply pressure between them"
+        raise InputError(Message(f"{what} leave no room on {plant.name}", method, expected))
     return np.array([low, high])
-
-
-def pushed_mode(mode: Mode, area_m2: float) -> Mode:
-    """The mode with a force of 1 N on the slide: as much as 1 / area of pressure a."""
-    v, pressure = (mode.state_names.index(name) for name in (VELOCITY, PRESSURES[0]))
-    more = np.zeros(len(mode.drift))
-    more[v] = mode.A[v, pressure] / area_m2
-    return replace(mode, drift=mode.drift + more)
-
-
-def stacked(
-    F: np.ndarray, G: np.ndarray, offset: np.ndarray, horizon: int
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """free, forced, drift of X = (x_1, ..., x_N): shapes (n N, n), (n N, N), (n N,)."""
-    n = len(F)
-    free, forced, drift = np.zeros((horizon, n, n)), np.zeros((horizon, n, horizon)), []
-    power, constant = np.eye(n), np.zeros(n)
-    response = []
-    for i in range(horizon):
-        response.append((power @ G)[:, 0])
-        power, constant = F @ power, F @ constant + offset
-        free[i] = power
-        drift.append(constant)
-        for j in range(i + 1):
-            forced[i, :, j] = response[i - j]
-    return free.reshape(-1, n), forced.reshape(-1, horizon), np.concatenate(drift)

@@ -1,7 +1,7 @@
 """Linear MPC: one condensed quadratic program per mode, solved from the last plan.
 
     min   sum_i |x_i - target_i|_Q^2 + |u_i - u_s|_R^2 + |u_i - u_i-1|_S^2 + |x_N - target_N|_P^2
-          + rho |slack|^2
+          + rho |slack|^2 + sigma slack
     s.t.  x_i+1 = F x_i + G u_i + offset,   u_lower <= u_i <= u_upper,
           lower - slack <= position, velocity, pressures <= upper + slack,   slack >= 0,
           |u_i - u_i-1| <= move + slack
@@ -9,7 +9,11 @@
 P is the cost-to-go of the LQ design, so that without active limits the first move is that of LQ.
 Steady errors are taken out by a disturbance force on the slide, which grows with the integral of
 the error: the prediction feels it and the target pressures balance it.  Inputs are limited hard,
-states and the rate of the input softly, so that the program always has a solution.
+states and the rate of the input softly, so that the program always has a solution.  Since a
+violation has a price in proportion too, a limit that can be kept is kept as long as it is worth
+less to violate it.  The reference counts as far as the position may go, and the integral rests
+where velocity or pressures are at a limit towards which it pushes, as at an end of the valve: a
+slide that a limit leaves too little force to break away stands still.
 
 The mode is that of the place to which the last plan leads in half a horizon.  Where a state is not
 finite, the solver has no answer, or its answer comes after the deadline, the last plan goes on, and
@@ -17,6 +21,9 @@ the notes say so.
 
 Where the unconstrained optimum keeps all limits it is the solution, and no solver is asked.  At the
 limits it is DAQP unless another one is given, see :mod:`controllers.program_solvers`.
+
+Source: E. C. Kerrigan and J. M. Maciejowski, "Soft constraints and exact penalty functions in model
+predictive control", Proc. UKACC Int. Conf. Control (2000), for the price of a violation.
 """
 
 from __future__ import annotations
@@ -32,22 +39,47 @@ from controllers.condensed import SLACKS, MpcSpec, Program, limits_of, program_o
 from controllers.margins import Law
 from controllers.motion import PREVIEW
 from controllers.positioning import STATES, Memory, Positioning, Task, positioning
-from controllers.program_solvers import Daqp, Solver
+from controllers.program_solvers import Daqp, Solver, Start
 from controllers.scheduled import Schedule, scheduled
 from linearize.modes import HybridModel
 from linearize.reduction import closed_command
 from workbench.contracts import Command, Estimate
 
+PUSHED = np.array([0.0, 1.0, 1.0, -1.0])  # ways of velocity and pressures as the slide is pushed
+ROUNDED = 1e-3  # cost per unit of a slack: multipliers below are rounding of a solver
 NONE = np.zeros(SLACKS)  # no limit is violated
 
 
 @dataclass(frozen=True)
 class Plan:
-    """The last solution: openings ahead (N,), the whole primal z, and the place half-way (m)."""
+    """The last solution.
+
+    openings      those ahead, shape (N,)
+    primal        the whole z
+    place_m       the place half-way
+    multipliers   of the rows; None where no limit was met
+    """
 
     openings: np.ndarray
     primal: np.ndarray
     place_m: float = nan
+    multipliers: np.ndarray | None = None
+
+    def against(self, force: float) -> bool:
+        """Whether velocity or pressures are at a limit towards which such a force pushes."""
+        if self.multipliers is None:
+            return False
+        n, states = len(self.openings), len(STATES)
+        below, above = (
+            self.multipliers[n * (1 + side * SLACKS) :][: n * states] for side in (0, 1)
+        )
+        held = (below + above).reshape(n, states).sum(axis=0)
+        return bool((held * PUSHED * np.sign(force) > ROUNDED).any())
+
+    @property
+    def start(self) -> Start | None:
+        """Where a solver may begin: what was active is likely to be so a sample later."""
+        return None if self.multipliers is None else Start(self.primal, self.multipliers)
 
     def shifted(self) -> Plan:
         """The same plan a sample later, its last opening held."""
@@ -62,10 +94,13 @@ class LinearMpc:
     Attributes
     ----------
     deadline_s
-        What takes longer is late.  No limit by default, so that a run does not depend on the speed
-        of the machine.
+        What takes longer is late.  That is seen only once the solver has ended, which nothing cuts
+        short: the command is then that of the last plan, but comes as late.  No limit by default,
+        so that a run does not depend on the speed of the machine.
     clock
         Seconds, from any moment on.
+    places_m
+        From where to where the position may go.
     """
 
     task: Positioning
@@ -73,6 +108,7 @@ class LinearMpc:
     sample_time_s: float
     force_n_m_s: float
     preview: int
+    places_m: tuple[float, float]
     deadline_s: float = inf
     clock: Callable[[], float] = perf_counter
 
@@ -90,6 +126,7 @@ class LinearMpc:
         x = estimate.pick(STATES)
         if not np.isfinite(x).all():
             return self._unseen(last)
+        reference = np.clip(reference, *self.places_m)
         now = self.task.task(memory, reference, x, self.sample_time_s)
         if now.rests:
             shut = valve.sent(0.0, estimate)
@@ -102,7 +139,7 @@ class LinearMpc:
             plan, notes = (memory.plan or steady).shifted(), {"fallback": 1.0}
         smallest_v, largest_v = valve.openings_v
         opening = min(max(float(plan.openings[0]), smallest_v), largest_v)
-        if opening in valve.openings_v:
+        if opening in valve.openings_v or plan.against(-now.rate_m):
             integral = memory.integral_m_s
         notes = {"resting": 0.0, "opening_v": opening, "integral_m_s": integral, **notes}
         notes["late"] = float(late)
@@ -133,7 +170,7 @@ class LinearMpc:
         targets = self._targets(now, reference, program.horizon, friction_n)
         g = program.gradient(unforced, targets, now.opening_v, last_v)
         low, high = program.bounds(unforced, last_v)
-        z = -program.inverse @ g
+        z = program.unlimited(g)
         at = program.rows @ z
         if (at >= low).all() and (at <= high).all():
             plan, notes = Plan(z[: program.horizon], z), {"fallback": 0.0, "iterations": 0.0}
@@ -172,10 +209,10 @@ def limited_plan(
 ) -> tuple[Plan, dict[str, float]]:
     """The best plan, started from the last one; without an answer the last one, shifted."""
     n = program.horizon
-    found = program.solved(g, low, high, before.primal if before else None)
+    found = program.solved(g, low, high, before.start if before else None)
     if found:
-        z, iterations = found
-        return Plan(z[:n], z), {"fallback": 0.0, "iterations": float(iterations)}
+        plan = Plan(found.z[:n], found.z, multipliers=found.multipliers)
+        return plan, {"fallback": 0.0, "iterations": float(found.iterations)}
     return (before or steady_plan(n, steady_v)).shifted(), {"fallback": 1.0}
 
 
@@ -210,4 +247,5 @@ def linear_mpc(
         sample_time_s=spec.sample_time_s,
         force_n_m_s=spec.force_n_m_s,
         preview=max(spec.horizon + 1, PREVIEW),
+        places_m=tuple(limits[:, 0]),
     )

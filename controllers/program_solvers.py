@@ -14,7 +14,7 @@ Programming Computation 12 (2020) 637.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -26,8 +26,25 @@ OPTIMAL = 1  # DAQP's flag
 FAR = 1e30  # as good as no bound
 FEASIBLE = 1e-5  # V, or units of the slack
 
-Answer = tuple[np.ndarray, int] | None
-"""The optimum z, shape (n_z,), and the solver's iterations; None where there is none."""
+
+class Answer(NamedTuple):
+    """What a solver found, and where the next program may start.
+
+    z             the optimum, shape (n_z,)
+    iterations    those of the solver
+    multipliers   of the rows, shape (n_c,): positive at the upper side, negative at the lower
+    """
+
+    z: np.ndarray
+    iterations: int
+    multipliers: np.ndarray
+
+
+class Start(NamedTuple):
+    """The last optimum z and its multipliers, as :class:`Answer` has them."""
+
+    z: np.ndarray
+    multipliers: np.ndarray
 
 
 class Solver(Protocol):
@@ -39,15 +56,19 @@ class Solver(Protocol):
         g: np.ndarray,
         low: np.ndarray,
         high: np.ndarray,
-        start: np.ndarray | None,
-    ) -> Answer:
-        """The optimum, from a start where there is one."""
+        start: Start | None,
+    ) -> Answer | None:
+        """The optimum, from a start where there is one; None where there is no optimum."""
         ...
 
 
 @dataclass(frozen=True)
 class Daqp:
-    """The dual active-set method; exact, and the faster one here."""
+    """The dual active-set method; exact, and the faster one here.
+
+    It starts from the multipliers, whose signs tell what was active.  By the last z alone it finds
+    nothing active, since the sides have moved on by a sample.
+    """
 
     def solved(
         self,
@@ -55,24 +76,29 @@ class Daqp:
         g: np.ndarray,
         low: np.ndarray,
         high: np.ndarray,
-        start: np.ndarray | None,
-    ) -> Answer:
+        start: Start | None,
+    ) -> Answer | None:
         import daqp
 
         if not np.isfinite(g).all():
             return None
         first, rest = program.order
         lower, upper = (np.nan_to_num(side, posinf=FAR, neginf=-FAR) for side in (low, high))
+        order = np.concatenate([first, rest])
         z, _, flag, info = daqp.solve(
             program.H,
             g,
             program.general,
-            np.concatenate([upper[first], upper[rest]]),
-            np.concatenate([lower[first], lower[rest]]),
+            upper[order],
+            lower[order],
             np.zeros(len(low), dtype=np.int32),
-            primal_start=start,
+            dual_start=start.multipliers[order] if start else None,
         )
-        return checked(program, z, low, high, int(info["iterations"])) if flag == OPTIMAL else None
+        if flag != OPTIMAL:
+            return None
+        multipliers = np.empty(len(order))
+        multipliers[order] = info["lam"]
+        return checked(program, Answer(z, int(info["iterations"]), multipliers), low, high)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,8 +114,8 @@ class Osqp:
         g: np.ndarray,
         low: np.ndarray,
         high: np.ndarray,
-        start: np.ndarray | None,
-    ) -> Answer:
+        start: Start | None,
+    ) -> Answer | None:
         import osqp
 
         if not np.isfinite(g).all():
@@ -108,19 +134,17 @@ class Osqp:
             verbose=False,
         )
         if start is not None:
-            solver.warm_start(x=start)
+            solver.warm_start(x=start.z, y=start.multipliers)
         found = solver.solve(raise_error=False)
         if found.info.status_val != osqp.SolverStatus.OSQP_SOLVED:
             return None
-        return checked(program, found.x, low, high, int(found.info.iter))
+        return checked(program, Answer(found.x, int(found.info.iter), found.y), low, high)
 
 
-def checked(
-    program: Program, z: np.ndarray, low: np.ndarray, high: np.ndarray, iterations: int
-) -> Answer:
+def checked(program: Program, answer: Answer, low: np.ndarray, high: np.ndarray) -> Answer | None:
     """The answer of a solver if it is finite and keeps the sides of all rows."""
-    if not np.isfinite(z).all():
+    if not np.isfinite(answer.z).all():
         return None
-    at = program.rows @ z
+    at = program.rows @ answer.z
     kept = (at >= low - FEASIBLE).all() and (at <= high + FEASIBLE).all()
-    return (z, iterations) if kept else None
+    return answer if kept else None

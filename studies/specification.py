@@ -19,7 +19,7 @@ from controllers import CONTROLLERS
 from controllers.condensed import MpcSpec
 from controllers.spec import replaced
 from linearize.axes import stroke_m
-from linearize.standard import POSITION, PRESSURES, SHIFT_MODES, SLIDE_MODES, SUPPLY
+from linearize.standard import POSITION, PRESSURES, SHIFT_MODES, SLIDE_MODES, SUPPLY, VELOCITY
 from studies.following import BENCHES, FOLLOWING_LINES, STEP_LINES
 from studies.following_check import Followed, tasks_of
 from studies.scenarios import SCENARIOS
@@ -158,7 +158,7 @@ def read_specification(
 def design_numbers(spec: Specification, method: str, plant: Plant) -> dict[str, Any]:
     """Numbers of a design: those of its table, and for an MPC its limits where the table has none.
 
-    The MPC keeps one margin to both ends and one pair of limits for both pressures: the tightest.
+    The MPC keeps one speed both ways and one pair of limits for both pressures: the tightest.
     """
     own = dict(spec.numbers.get(method, {}))
     if method not in CONTROLLERS or CONTROLLERS[method].spec is not MpcSpec:
@@ -167,7 +167,11 @@ def design_numbers(spec: Specification, method: str, plant: Plant) -> dict[str, 
     limits = {each.figure: each for each in spec.asked if isinstance(each, Limit)}
     if POSITION in limits:
         place = limits[POSITION]
-        numbers["margin_m"] = max(place.least, stroke_m(plant) - place.most, 0.0)
+        numbers["lowest_m"] = max(place.least, 0.0)
+        numbers["below_end_m"] = max(stroke_m(plant) - place.most, 0.0)
+    if VELOCITY in limits:
+        ways = -limits[VELOCITY].least, limits[VELOCITY].most
+        numbers["fastest_m_s"] = min(speed for speed in ways if speed > 0.0)
     pressures = [limits[name] for name in PRESSURES if name in limits]
     if pressures:
         highest_pa = min(each.most for each in pressures)

@@ -44,7 +44,7 @@ def limited(programs: Sequence[Program], number: int, seed: int = 0) -> Iterator
         targets = np.tile([place_m, 0.0, 5e5, 5e5], program.horizon)
         g = program.gradient(unforced, targets, 0.0, 0.0)
         low, high = program.bounds(unforced, 0.0)
-        at = program.rows @ (-program.inverse @ g)
+        at = program.rows @ program.unlimited(g)
         if (at < low).any() or (at > high).any():
             yield program, g, low, high
 

@@ -203,6 +203,14 @@ def test_limits_of_the_pressures_follow_the_supply():
     assert limits_of(low, MpcSpec())[1, 2:].tolist() == [4.9e5, 4.9e5]
 
 
+def test_each_end_of_the_position_has_its_own_limit_outside_the_margin():
+    both = limits_of(PLANT, MpcSpec(lowest_m=0.05, below_end_m=0.1))[:, 0]
+    none = limits_of(PLANT, MpcSpec(margin_m=0.06, lowest_m=0.05))[:, 0]
+
+    assert both.tolist() == [0.05, stroke_m(PLANT) - 0.1]
+    assert none.tolist() == [0.06, stroke_m(PLANT) - 0.06]
+
+
 def test_time_outside_the_limits_is_counted_against_the_own_supply():
     from studies.closed_loop_metrics import _violation_s
     from workbench.closed_loop import LoopRecord

@@ -235,10 +235,11 @@ def test_a_file_of_another_shape_is_refused_with_its_line(text, expected):
 
 @pytest.mark.parametrize("method", ["mpc", "nonlinear-mpc"])
 def test_the_limits_of_a_specification_are_those_of_an_mpc_unless_its_table_has_its_own(method):
-    """One margin to both ends and one pair for both pressures: the tightest."""
+    """Two of the position; one speed both ways and one pair for both pressures: the tightest."""
     stroke_mm = 1e3 * stroke_m(DRIVE.plant)
     spec = read_specification(
         f'[limits]\nslide.position = ["5 mm", "{stroke_mm - 9} mm"]\n'
+        'slide.velocity = ["-0.4 m/s", "0.3 m/s"]\n'
         'chamber_a.pressure = ["1.5 bar", "6 bar"]\nchamber_b.pressure = "5 bar"\n'
         f"[{method}]\nlowest_pa = 1.1e5\nhorizon = 30\n",
         DRIVE,
@@ -246,7 +247,9 @@ def test_the_limits_of_a_specification_are_those_of_an_mpc_unless_its_table_has_
     numbers = design_numbers(spec, method, DRIVE.plant)
 
     assert numbers == {
-        "margin_m": pytest.approx(9e-3),
+        "lowest_m": pytest.approx(5e-3),
+        "below_end_m": pytest.approx(9e-3),
+        "fastest_m_s": pytest.approx(0.3),
         "below_supply_pa": pytest.approx(2e5),
         "lowest_pa": 1.1e5,
         "horizon": 30,
