@@ -3,7 +3,8 @@
     P = K_p (b r - y),   D = K_d (c dr/dt - slope of y),   I' = K_i (r - y) + (sent - wanted) / T_t
     opening = limited(P + I + D + share * opening of the wanted motion) + dither
 
-The integral is kept in volts.  Where the gains change with the mode, it takes over what P and D
+The integral is kept in volts and begins with K_p (1 - b) r, so an axis at rest on its target stays
+there; what b takes from a later step comes in by the integral, within K_p / K_i.  Where the gains change with the mode, it takes over what P and D
 lose or gain by that, so that the opening does not jump (bumpless transfer).  Where the valve is at
 its limit, it follows what was sent (back-calculation), within T_i = K_p / K_i by default: in a
 shorter time a large step drives it against the error, and it needs T_i to come back.
@@ -46,6 +47,10 @@ class PidGains:
     derivative: float
     setpoint: float = 1.0
     setpoint_rate: float = 0.0
+
+    def held_v(self, place: float) -> float:
+        """The integral with which an axis at rest on its target stays there."""
+        return self.proportional * (1.0 - self.setpoint) * place
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,7 +136,8 @@ class TwoDegreePid(OnMeasurement):
         moving = motion(reference[0, :PREVIEW], dt, self.feedforward.limits)
         ahead = self._ahead(moving[0], float(reference[0, 0] - y))
         now = mixed(self.gains, float(y), ahead)
-        memory = last.memory or PidMemory(0.0, settled(self._filter, y), now, 0)
+        begun_v = now.held_v(float(reference[0, 0]))
+        memory = last.memory or PidMemory(begun_v, settled(self._filter, y), now, 0)
         slope = float(C @ memory.slopes + D * y)
 
         def proportional_and_rate(gains: PidGains) -> float:

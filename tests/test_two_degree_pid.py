@@ -79,10 +79,13 @@ def test_noise_on_the_slope_falls_with_the_periods_over_which_it_is_taken():
 
 
 def steps(pid, reference, positions):
-    """Openings and commands along given positions; the reference stands still."""
+    """Openings and commands along given positions; the reference stands, or has one per position.
+
+    What comes is not seen: each is held for all of the preview.
+    """
     command, found = pid.start(), []
-    held = np.full((1, pid.preview), reference)
-    for y in positions:
+    for r, y in zip(np.broadcast_to(reference, len(positions)), positions, strict=True):
+        held = np.full((1, pid.preview), r)
         command = pid.step(command, held, Estimate((pid.signal,), np.array([y]), np.zeros((1, 1))))
         found.append((command.notes["opening_v"], float(command.value[0])))
     return np.array(found).T
@@ -90,10 +93,31 @@ def steps(pid, reference, positions):
 
 def test_proportional_integral_and_setpoint_weight_are_what_they_say(rig):
     gains = PidGains(proportional=20.0, integral=5.0, derivative=0.0, setpoint=0.4)
-    openings, _ = steps(pid_with(rig, gains), 0.09, [0.08] * 3)
+    openings, _ = steps(pid_with(rig, gains), [0.08, *[0.09] * 3], [0.08] * 4)
 
-    direct = 20.0 * (0.4 * 0.09 - 0.08)
-    assert openings == pytest.approx([direct + 5.0 * 0.01 * DT * k for k in (1, 2, 3)])
+    direct = 20.0 * 0.4 * 0.01
+    assert openings[0] == pytest.approx(0.0, abs=1e-12)
+    assert openings[1:] == pytest.approx([direct + 5.0 * 0.01 * DT * k for k in (1, 2, 3)])
+
+
+def test_an_axis_at_rest_on_its_target_stays_there_whatever_the_setpoint_weight(rig):
+    """P alone sent -(1 - b) K_p r: the drive of the bench ended its step 53 mm away."""
+    gains = PidGains(proportional=20.0, integral=5.0, derivative=0.1, setpoint=0.4)
+    openings, _ = steps(pid_with(rig, gains), 0.09, [0.09] * 50)
+
+    assert openings == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_setpoint_weight_is_kept_where_the_gains_change_with_the_mode(rig):
+    """On the target the integral takes over what P loses there, and moves nothing."""
+    soft = PidGains(proportional=10.0, integral=5.0, derivative=0.0, setpoint=0.4)
+    hard = PidGains(proportional=60.0, integral=50.0, derivative=0.0, setpoint=0.4)
+    sides = Schedule(np.array([0.08, 0.08001]), (soft, hard), (soft, hard))
+    path = [0.079] * 5 + [0.081] * 5
+    openings, _ = steps(pid_with(rig, sides), 0.079, path)
+
+    assert openings[:5] == pytest.approx(0.0, abs=1e-12)
+    assert openings[5:] == pytest.approx(-10.0 * 0.002, rel=0.03)
 
 
 def test_gains_that_change_with_the_mode_leave_the_opening_where_it_was(rig):
