@@ -18,6 +18,7 @@ from controllers.positioning import (
 )
 from controllers.scheduled import Schedule, scheduled
 from controllers.spec import ranged
+from controllers.unseen import waiting
 from linearize.modes import HybridModel, Mode
 from linearize.standard import POSITION, VELOCITY
 from workbench.contracts import Command, Estimate
@@ -104,6 +105,7 @@ class Pid:
     def start(self) -> Command:
         return Command(self.task.valve.shut, Memory(plan=0.0))
 
+    @waiting
     def step(self, last: Command, reference: np.ndarray, estimate: Estimate) -> Command:
         memory, valve, dt = last.memory, self.task.valve, self.sample_time_s
         now = self.task.task(memory, reference, estimate.pick(STATES), dt)

@@ -20,6 +20,7 @@ from controllers.motion import PREVIEW, MotionLimits, Sliding, motion, sliding_o
 from controllers.ranges import InRanges, ranges_of
 from controllers.scheduled import Schedule, scheduled
 from controllers.through_valve import ThroughValve, through_valve
+from controllers.unseen import waiting
 from linearize.modes import HybridModel
 from linearize.reduction import closed_command
 from workbench.contracts import Command, Estimate
@@ -74,6 +75,7 @@ class Regulator:
     def start(self) -> Command:
         return Command(self.valve.shut, 0.0)
 
+    @waiting
     def step(self, last: Command, reference: np.ndarray, estimate: Estimate) -> Command:
         spec, x = self.spec, estimate.pick(self.axis.states)
         wanted = motion(reference[0, :PREVIEW], spec.sample_time_s, spec.limits)

@@ -17,6 +17,7 @@ from controllers.positioning import (
     positioning,
 )
 from controllers.scheduled import Schedule, scheduled
+from controllers.unseen import waiting
 from linearize.modes import HybridModel
 from linearize.standard import COMMAND, POSITION, PRESSURES, VELOCITY
 from workbench.contracts import Command, Estimate
@@ -66,6 +67,7 @@ class StateFeedback:
     def start(self) -> Command:
         return Command(self.task.valve.shut, Memory())
 
+    @waiting
     def step(self, last: Command, reference: np.ndarray, estimate: Estimate) -> Command:
         memory, valve = last.memory, self.task.valve
         now = self.task.task(memory, reference, estimate.pick(STATES), self.sample_time_s)

@@ -3,11 +3,12 @@
     P = K_p (b r - y),   D = K_d (c dr/dt - slope of y),   I' = K_i (r - y) + (sent - wanted) / T_t
     opening = limited(P + I + D + share * opening of the wanted motion) + dither
 
-The integral is kept in volts and begins with K_p (1 - b) r, so an axis at rest on its target stays
-there; what b takes from a later step comes in by the integral, within K_p / K_i.  Where the gains change with the mode, it takes over what P and D
-lose or gain by that, so that the opening does not jump (bumpless transfer).  Where the valve is at
-its limit, it follows what was sent (back-calculation), within T_i = K_p / K_i by default: in a
-shorter time a large step drives it against the error, and it needs T_i to come back.
+The integral is kept in volts and begins with K_p (1 - b) r, so that an axis at rest on its target
+stays there; what b takes from a later step comes in by the integral, within K_p / K_i.  Where the
+gains change with the mode, it takes over what P and D lose or gain by that, so that the opening
+does not jump (bumpless transfer).  Where the valve is at its limit, it follows what was sent
+(back-calculation), within T_i = K_p / K_i by default: in a shorter time a large step drives it
+against the error, and it needs T_i to come back.
 
 The opening of the wanted motion comes from the modes and builds the pressures that belong to it:
 those against dry friction and gravity in that direction (friction compensation), and those of speed
@@ -32,6 +33,7 @@ from controllers.on_measurement import OnMeasurement
 from controllers.scheduled import Schedule
 from controllers.spec import ranged
 from controllers.through_valve import ThroughValve
+from controllers.unseen import waiting
 from workbench.contracts import Command, Estimate
 
 
@@ -130,6 +132,7 @@ class TwoDegreePid(OnMeasurement):
     def start(self) -> Command:
         return Command(self.valve.shut)
 
+    @waiting
     def step(self, last: Command, reference: np.ndarray, estimate: Estimate) -> Command:
         dt, (y,) = self.sample_time_s, estimate.pick([self.signal])
         A, B, C, D = self._filter
