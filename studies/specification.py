@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
-from math import inf, isfinite
+from math import inf, isfinite, isnan, nan
 from pathlib import Path
 from typing import Any
 
@@ -61,6 +61,7 @@ SHIFT_LINES = {
 
 ALL_LINES = {*SLIDE_LINES, *SHIFT_LINES, *FOLLOWING_LINES, *STEP_LINES}
 EVERYWHERE = ("air_kg", "switches")  # all else asks for an end at rest, or for none
+ARRIVED = (OVERSHOOT, "limit_cycle")  # of a step that never rose there is none to speak of
 MOVING = ("rmse_m", "rmse_rad", "largest_error_m", "largest_error_rad")
 
 
@@ -83,8 +84,13 @@ class Asked:
     scale: Scale
 
     def found(self, row: Any, record: LoopRecord) -> float:
-        """The figure of a run; NaN where it has none, as the rise of a step that never rose."""
+        """The figure of a run; NaN where it has none.
+
+        So for a step that never rose: an axis that stays where it is neither overshoots nor swings.
+        """
         figures = row.figures if isinstance(row, Followed) else vars(row)
+        if self.figure.startswith(ARRIVED) and isnan(figures.get("rise_s", 0.0)):
+            return nan
         return figures[self.figure] if self.figure in figures else getattr(row, self.figure)
 
     def excess(self, found: float) -> float:

@@ -136,9 +136,9 @@ def design(
         if asked and asked.asked:
             from studies.checked_runs import check_rig
 
-            judged = check_rig(known, output, spec=asked, say=say).judged
-            typer.echo("\n" + judged.text)
-            tell_missed(judged)
+            checked = check_rig(known, output, spec=asked, say=say)
+            typer.echo("\n" + checked.judged.text)
+            tell_missed(checked)
 
 
 @contextmanager
