@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
@@ -54,6 +55,10 @@ class PidSpec:
         Time constant of the filter on the velocity; none by default, since an estimate is smooth
         already, and each millisecond of lag takes from a lightly damped spring.
     """
+
+    ELSEWHERE: ClassVar[Mapping[str, str]] = {
+        "bandwidth_hz": "`axis-pid` is tuned to a bandwidth: [axis-pid.tuning] bandwidth_hz"
+    }
 
     sample_time_s: float = 1e-3
     stiffening: float = ranged(8.0, least=1.0, above=True)

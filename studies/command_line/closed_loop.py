@@ -44,7 +44,8 @@ def check(
         typer.Option(
             "--estimator",
             metavar="NAME",
-            help="ekf (usual), ukf, imm, mhe, kalman; not for shifts; by mode: ekf,ukf@stick.",
+            help="ekf (usual), ukf, imm, mhe, kalman; by mode: ekf,ukf@stick; raw: the measurement "
+            "itself, for axis-pid; not for shifts.",
         ),
     ] = None,
     scenario: Annotated[

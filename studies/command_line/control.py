@@ -109,6 +109,7 @@ def design(
         from controllers.design_file import design as design_controller
         from controllers.design_file import gains, write_design
         from studies.design_document import design_document
+        from studies.design_doubts import design_doubts
         from studies.design_report import design_report
         from studies.design_text import design_texts
         from studies.sample_times import require_multiple
@@ -132,6 +133,8 @@ def design(
             typer.echo(f"{name}: {gain}")
         for part in design_texts(report):
             typer.echo(part)
+        for doubt in design_doubts(report):
+            typer.echo(f"warning: {doubt}", err=True)
         typer.echo(f"wrote {output}")
         if asked and asked.asked:
             from studies.checked_runs import check_rig
