@@ -19,6 +19,7 @@ from controllers.margins import Law, integral_of
 from controllers.motion import PREVIEW, MotionLimits, Sliding, motion, sliding_on
 from controllers.ranges import InRanges, ranges_of
 from controllers.scheduled import Schedule, scheduled
+from controllers.spec import ranged
 from controllers.through_valve import ThroughValve, through_valve
 from controllers.unseen import waiting
 from linearize.modes import HybridModel
@@ -111,7 +112,7 @@ class AxisLqSpec:
     """
 
     sample_time_s: float = 1e-3
-    position: float = 0.008
+    position: float = ranged(0.008, least=1e-5)  # as a micrometre of 100 mm
     velocity: float = 1.0
     pressure_pa: float = 1e6
     opening_v: float = 1.0

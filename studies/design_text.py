@@ -119,7 +119,7 @@ def certificate_text(found: Certificate) -> str:
 def search_text(made: HybridMpc) -> str:
     """What a hybrid MPC searches, and where each pair of held commands leads."""
     spec, pairs = made.spec, len(made.search.plans(0).switches) ** 2
-    held = number(1e3 * spec.hold_s, 3)
+    held = number(1e3 * spec.held * spec.sample_time_s, 3)
     lines = [f"of {pairs} pairs of plans over {spec.horizon} samples, {held} ms between switches:"]
     judged = f"{spec.judged} of the best and of those near the last plan"
     lines.append(f"ranked on affine modes; {judged} are judged as they are at a sample that ranks;")

@@ -120,6 +120,9 @@ def design(
         known = load_rig(rig)
         asked = read_specification(spec, known) if spec else None
         numbers = design_numbers(asked, controller, known.plant) if asked else {}
+        if unused := [name for name in (asked.numbers if asked else ()) if name != controller]:
+            tables = " and ".join(f"[{name}]" for name in unused)
+            typer.echo(f"warning: {spec}: {tables} is not for {controller}, and not used", err=True)
         say(f"designing {controller}")
         with _placed_in(spec):
             found = design_controller(controller, known.plant, numbers)
