@@ -90,7 +90,8 @@ class AxisPidSpec:
     gains
         Gains of one's own in place of the tuning.
     setpoint, setpoint_rate
-        Shares of the reference in P and in D.
+        Shares of the reference in P and in D.  What the first takes from a step comes in by the
+        integral, whose usual time of 9 s on a drive is long: give it fewer ``integral_periods``.
     feedforward_share
         Of the opening of the wanted motion; friction is compensated by it too.
     filter_s, span
@@ -145,7 +146,7 @@ def axis_pid(hybrid: HybridModel, spec: AxisPidSpec | None = None) -> TwoDegreeP
     ------
     InputError
         If a mode does not allow the bandwidth, with the nearest that all of them allow; or if of
-        the gains the proportional one is missing.
+        the gains the proportional one is missing, or the integral one that a setpoint needs.
     """
     spec = spec or AxisPidSpec()
     ((_, wide),) = ranges_of(hybrid.plant)
@@ -159,7 +160,16 @@ def axis_pid(hybrid: HybridModel, spec: AxisPidSpec | None = None) -> TwoDegreeP
 
 
 def _own(spec: AxisPidSpec) -> PidGains:
-    """The given gains with the shares of the reference."""
+    """The given gains with the shares of the reference.
+
+    Raises
+    ------
+    InputError
+        If a share of P needs an integral, and there is none.
+    """
+    if spec.setpoint != 1.0 and not spec.gains.integral:
+        what, where = "takes from every step what no integral gives back", "axis-pid.setpoint"
+        raise InputError(Message(what, where, "1, or an integral gain above 0"))
     return PidGains(
         proportional=spec.gains.proportional,
         integral=spec.gains.integral,

@@ -31,6 +31,7 @@ from controllers.positioning import (
 )
 from controllers.scheduled import Schedule, scheduled
 from controllers.spec import ranged
+from controllers.unseen import waiting
 from linearize.modes import HybridModel, Mode
 from linearize.standard import PRESSURES, SUPPLY, VELOCITY
 from workbench.contracts import Command, Estimate
@@ -124,6 +125,7 @@ class Cascade:
     def start(self) -> Command:
         return Command(self.task.valve.shut, Memory())
 
+    @waiting
     def step(self, last: Command, reference: np.ndarray, estimate: Estimate) -> Command:
         memory, valve, area = last.memory, self.task.valve, self.task.area_m2
         now = self.task.task(memory, reference, estimate.pick(STATES), self.sample_time_s)

@@ -26,7 +26,7 @@ from dataclasses import dataclass
 from itertools import combinations, product
 
 import numpy as np
-from scipy.linalg import eigvalsh, solve_discrete_lyapunov
+from scipy.linalg import LinAlgWarning, eigvalsh, solve_discrete_lyapunov
 
 LONGEST = 1 << 14  # samples of dwell time that are still looked at
 MOST = 1.0 - 1e-9  # that a function may keep of itself in a sample
@@ -177,7 +177,11 @@ def _positive(P: np.ndarray) -> bool:
 
 def _coordinates(A: np.ndarray) -> np.ndarray:
     """T of x = T z: in z the function that A shrinks evenly, A' P A - P = -I, is the identity."""
-    return np.linalg.inv(np.linalg.cholesky(solve_discrete_lyapunov(A.T, np.eye(len(A)))).T)
+    with warnings.catch_warnings():
+        # Any coordinates do: what is found in them is tried on the loops.
+        warnings.simplefilter("ignore", LinAlgWarning)
+        P = solve_discrete_lyapunov(A.T, np.eye(len(A)))
+    return np.linalg.inv(np.linalg.cholesky(P).T)
 
 
 def _radius(A: np.ndarray) -> float:

@@ -28,6 +28,7 @@ from controllers.motion import PREVIEW, MotionLimits, motion
 from controllers.ranges import InRanges, ranges_of
 from controllers.spec import ranged
 from controllers.through_valve import ThroughValve, through_valve
+from controllers.unseen import waiting
 from linearize.modes import HybridModel
 from linearize.reduction import DesignModel, design_model
 from workbench.contracts import Command, Estimate
@@ -94,6 +95,7 @@ class FeedbackLinearising:
     def start(self) -> Command:
         return Command(self.valve.shut, 0.0)
 
+    @waiting
     def step(self, last: Command, reference: np.ndarray, estimate: Estimate) -> Command:
         spec, x = self.spec, estimate.pick(self.model.states)
         y, v = estimate.pick((self.axis.position, self.axis.velocity))

@@ -83,8 +83,13 @@ class HybridMpcSpec:
     end_s: float = 5e-3
     brake_m_s2: float = 400.0
     brake_after_s: float = 5e-3
-    switch_s: float = 1.5e-4
+    switch_s: float = ranged(1.5e-4, most=0.05, above=True)
     judged: int = ranged(28, least=8, most=400)
+
+    @property
+    def held(self) -> int:
+        """Samples for which a command stays: none is cut, so they may take longer than asked."""
+        return int(np.ceil(self.hold_s / self.sample_time_s - 1e-9))
 
     @property
     def cost(self) -> ShiftCost:
@@ -226,7 +231,7 @@ def hybrid_mpc(hybrid: HybridModel, spec: HybridMpcSpec | None = None) -> Hybrid
         If more pairs are to be judged than there are, or no pulse ends within the horizon.
     """
     spec, plant = spec or HybridMpcSpec(), hybrid.plant
-    hold = int(np.ceil(spec.hold_s / spec.sample_time_s - 1e-9))
+    hold = spec.held
     if hold >= spec.horizon:
         found = f"is {spec.hold_s:g}, {hold} of {spec.horizon} samples ahead"
         expected = "a pulse that ends within the horizon"

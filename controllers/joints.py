@@ -34,7 +34,7 @@ class JointRegulators:
     def step(self, last: Command, reference: np.ndarray, estimate: Estimate) -> Command:
         return _together(
             [
-                each.step(Command(last.value, memory), reference[k : k + 1], estimate)
+                each.step(Command(last.value[k : k + 1], memory), reference[k : k + 1], estimate)
                 for k, (each, memory) in enumerate(zip(self.regulators, last.memory, strict=True))
             ]
         )
@@ -57,5 +57,7 @@ def joint_regulators(hybrid: HybridModel, spec: AxisLqSpec | None = None) -> Joi
 
 def _together(commands: list[Command]) -> Command:
     notes = {f"{k}_{key}": v for k, c in enumerate(commands, 1) for key, v in c.notes.items()}
+    if any("fallback" in command.notes for command in commands):
+        notes["fallback"] = 1.0
     value = np.concatenate([command.value for command in commands])
     return Command(value, tuple(command.memory for command in commands), notes)

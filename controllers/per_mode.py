@@ -29,6 +29,7 @@ from controllers.positioning import STATES, Memory, Positioning, PositioningSpec
 from controllers.scheduled import Schedule, driven_modes, scheduled
 from controllers.spec import chosen
 from controllers.state_feedback import LqSpec
+from controllers.unseen import waiting
 from linearize.modes import HybridModel, Mode
 from workbench.contracts import Command, Estimate
 from workbench.errors import Message, UnknownNameError, listed, nearest
@@ -72,6 +73,7 @@ class PerMode:
     def start(self) -> Command:
         return Command(self.task.valve.shut, Memory(plan=0.0))
 
+    @waiting
     def step(self, last: Command, reference: np.ndarray, estimate: Estimate) -> Command:
         memory, valve, dt = last.memory, self.task.valve, self.sample_time_s
         now = self.task.task(memory, reference, estimate.pick(STATES), dt)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from controllers.positioning import (
 )
 from controllers.scheduled import Schedule, scheduled
 from controllers.spec import ranged
+from controllers.unseen import waiting
 from linearize.modes import HybridModel, Mode
 from linearize.standard import POSITION, VELOCITY
 from workbench.contracts import Command, Estimate
@@ -53,6 +55,10 @@ class PidSpec:
         Time constant of the filter on the velocity; none by default, since an estimate is smooth
         already, and each millisecond of lag takes from a lightly damped spring.
     """
+
+    ELSEWHERE: ClassVar[Mapping[str, str]] = {
+        "bandwidth_hz": "`axis-pid` is tuned to a bandwidth: [axis-pid.tuning] bandwidth_hz"
+    }
 
     sample_time_s: float = 1e-3
     stiffening: float = ranged(8.0, least=1.0, above=True)
@@ -104,6 +110,7 @@ class Pid:
     def start(self) -> Command:
         return Command(self.task.valve.shut, Memory(plan=0.0))
 
+    @waiting
     def step(self, last: Command, reference: np.ndarray, estimate: Estimate) -> Command:
         memory, valve, dt = last.memory, self.task.valve, self.sample_time_s
         now = self.task.task(memory, reference, estimate.pick(STATES), dt)

@@ -23,6 +23,7 @@ import casadi as ca
 import numpy as np
 
 from controllers.spec import ranged
+from controllers.unseen import waiting
 from linearize.modes import HybridModel
 from linearize.reduction import DesignModel
 from workbench.contracts import Command, Estimate
@@ -68,6 +69,7 @@ class PressureControl:
     def start(self) -> Command:
         return Command(np.array([self.centre]), 0.0)
 
+    @waiting
     def step(self, last: Command, reference: np.ndarray, estimate: Estimate) -> Command:
         spec, x = self.spec, estimate.pick(self.model.states)
         error_pa = float(reference[0, 0] - x[0])

@@ -19,7 +19,9 @@ from controllers.margins import Law, integral_of
 from controllers.motion import PREVIEW, MotionLimits, Sliding, motion, sliding_on
 from controllers.ranges import InRanges, ranges_of
 from controllers.scheduled import Schedule, scheduled
+from controllers.spec import ranged
 from controllers.through_valve import ThroughValve, through_valve
+from controllers.unseen import waiting
 from linearize.modes import HybridModel
 from linearize.reduction import closed_command
 from workbench.contracts import Command, Estimate
@@ -74,6 +76,7 @@ class Regulator:
     def start(self) -> Command:
         return Command(self.valve.shut, 0.0)
 
+    @waiting
     def step(self, last: Command, reference: np.ndarray, estimate: Estimate) -> Command:
         spec, x = self.spec, estimate.pick(self.axis.states)
         wanted = motion(reference[0, :PREVIEW], spec.sample_time_s, spec.limits)
@@ -109,7 +112,7 @@ class AxisLqSpec:
     """
 
     sample_time_s: float = 1e-3
-    position: float = 0.008
+    position: float = ranged(0.008, least=1e-5)  # as a micrometre of 100 mm
     velocity: float = 1.0
     pressure_pa: float = 1e6
     opening_v: float = 1.0

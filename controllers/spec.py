@@ -124,7 +124,10 @@ def _refused(known: Field, default: float, value: object) -> str:
 
 
 def _unknown(spec: Any, key: str, where: str) -> Message:
-    """A key that is not there, with the nearest one, also of the tables inside."""
+    """A key that is not there, with the nearest one, also of the tables inside.
+
+    Where ``ELSEWHERE`` of a specification knows of another method that has it, with that.
+    """
     names = [f.name for f in fields(spec)]
     deeper = {
         f.name: f"{name}.{f.name}"
@@ -133,4 +136,7 @@ def _unknown(spec: Any, key: str, where: str) -> Message:
         for f in fields(getattr(spec, name))
     }
     near = nearest(key, names) or deeper.get(nearest(key, deeper), "")
-    return Message(f"{where} has no such number", f"{where}.{key}", f"one of {listed(names)}", near)
+    expected = f"one of {listed(names)}"
+    if elsewhere := getattr(spec, "ELSEWHERE", {}).get(key):
+        expected += f"; {elsewhere}"
+    return Message(f"{where} has no such number", f"{where}.{key}", expected, near)

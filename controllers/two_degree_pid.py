@@ -3,10 +3,12 @@
     P = K_p (b r - y),   D = K_d (c dr/dt - slope of y),   I' = K_i (r - y) + (sent - wanted) / T_t
     opening = limited(P + I + D + share * opening of the wanted motion) + dither
 
-The integral is kept in volts.  Where the gains change with the mode, it takes over what P and D
-lose or gain by that, so that the opening does not jump (bumpless transfer).  Where the valve is at
-its limit, it follows what was sent (back-calculation), within T_i = K_p / K_i by default: in a
-shorter time a large step drives it against the error, and it needs T_i to come back.
+The integral is kept in volts and begins with K_p (1 - b) r, so that an axis at rest on its target
+stays there; what b takes from a later step comes in by the integral, within K_p / K_i.  Where the
+gains change with the mode, it takes over what P and D lose or gain by that, so that the opening
+does not jump (bumpless transfer).  Where the valve is at its limit, it follows what was sent
+(back-calculation), within T_i = K_p / K_i by default: in a shorter time a large step drives it
+against the error, and it needs T_i to come back.
 
 The opening of the wanted motion comes from the modes and builds the pressures that belong to it:
 those against dry friction and gravity in that direction (friction compensation), and those of speed
@@ -31,6 +33,7 @@ from controllers.on_measurement import OnMeasurement
 from controllers.scheduled import Schedule
 from controllers.spec import ranged
 from controllers.through_valve import ThroughValve
+from controllers.unseen import waiting
 from workbench.contracts import Command, Estimate
 
 
@@ -46,6 +49,10 @@ class PidGains:
     derivative: float
     setpoint: float = 1.0
     setpoint_rate: float = 0.0
+
+    def held_v(self, place: float) -> float:
+        """The integral with which an axis at rest on its target stays there."""
+        return self.proportional * (1.0 - self.setpoint) * place
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,13 +132,15 @@ class TwoDegreePid(OnMeasurement):
     def start(self) -> Command:
         return Command(self.valve.shut)
 
+    @waiting
     def step(self, last: Command, reference: np.ndarray, estimate: Estimate) -> Command:
         dt, (y,) = self.sample_time_s, estimate.pick([self.signal])
         A, B, C, D = self._filter
         moving = motion(reference[0, :PREVIEW], dt, self.feedforward.limits)
         ahead = self._ahead(moving[0], float(reference[0, 0] - y))
         now = mixed(self.gains, float(y), ahead)
-        memory = last.memory or PidMemory(0.0, settled(self._filter, y), now, 0)
+        begun_v = now.held_v(float(reference[0, 0]))
+        memory = last.memory or PidMemory(begun_v, settled(self._filter, y), now, 0)
         slope = float(C @ memory.slopes + D * y)
 
         def proportional_and_rate(gains: PidGains) -> float:

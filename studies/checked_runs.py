@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import inf
+from math import inf, isfinite, isnan, nan
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -103,6 +103,16 @@ class CheckedRuns:
         if self.judged:
             return self.judged.met
         return not self.lost and all(row.reached is not False for row in self.found.rows)
+
+    @property
+    def unreached(self) -> tuple[str, ...]:
+        """The steps of which some run never rose, each with its number of runs where there are."""
+        runs: dict[str, set[int]] = {}
+        for number, loop in self._loops():
+            if "metrics" in loop and _never_rose(read(loop["metrics"])):
+                runs.setdefault(loop["scenario"], set()).add(number)
+        several = f" in {{}} of {len(self.rows)} runs" if self.several else ""
+        return tuple(scenario + several.format(len(those)) for scenario, those in runs.items())
 
     @cached_property
     def robustness(self) -> Robustness:
@@ -215,6 +225,12 @@ class CheckedRuns:
             "influences": moved,
             "worst_run": int(line.worst[0]) + 1,
         }
+
+
+def _never_rose(metrics: Mapping[str, Any]) -> bool:
+    """True for a step that did not come near its target; a sine has an amplitude instead."""
+    moving = isfinite(metrics.get("amplitude_m", nan))
+    return not moving and isnan(metrics.get("figures", metrics).get("rise_s", 0.0))
 
 
 def _kind(rig: Rig) -> tuple[type[Checked], type[Metrics | Shift | Followed]]:

@@ -61,6 +61,13 @@ def sensors(plant: Plant) -> Hardware:
     return Hardware(noise=noise, resolution=dict.fromkeys(positions, POSITION_GRID_M))
 
 
+def noise_of(plant: Plant) -> dict[str, float]:
+    """Standard deviation by output: noise, and what the resolution adds to it."""
+    hardware = sensors(plant)
+    coarse = {key: grid / 12**0.5 for key, grid in hardware.resolution.items()}
+    return {key: float(np.hypot(s, coarse.get(key, 0.0))) for key, s in hardware.noise.items()}
+
+
 @lru_cache(maxsize=8)
 def standard_estimator(name: str, plant: Plant, sample_time_s: float) -> Estimator:
     """An estimator of the registry for the sensors and the usual process noise; `raw` is none.
@@ -74,9 +81,7 @@ def standard_estimator(name: str, plant: Plant, sample_time_s: float) -> Estimat
     """
     if name == RAW:
         return RawMeasurement(names=plant.measured, sample_time_s=sample_time_s)
-    hardware, lean = sensors(plant), plant.lean()
-    coarse = {key: grid / 12**0.5 for key, grid in hardware.resolution.items()}
-    noise = {key: float(np.hypot(s, coarse.get(key, 0.0))) for key, s in hardware.noise.items()}
+    lean, noise = plant.lean(), noise_of(plant)
     process = {key: size for key, size in PROCESS_NOISE.items() if key in lean.model.states}
 
     def made(one: str) -> Estimator:

@@ -45,6 +45,7 @@ def _law(part: LawReport) -> Document:
         "delays_s": {"sensors": part.delays.sensors_s, "commands": part.delays.commands_s},
         "commands_foreseen": part.delays.foreseen,
         "margins": [_margins(each, part) for each in part.margins],
+        "margins_with_kalman_filter": [_numbers(each) for each in part.filtered],
         "certificate": _certificate(part.certificate),
     }
 
@@ -52,6 +53,14 @@ def _law(part: LawReport) -> Document:
 def _margins(each: Margins, part: LawReport) -> Document:
     """Of a loop that is unstable as it is: none, but what grows in it."""
     growth = part.growth.get(each.mode)
+    return {
+        **_numbers(each),
+        "grows_s": plain(growth.grows_s) if growth else None,
+        "swings_hz": plain(growth.swings_hz) if growth else None,
+    }
+
+
+def _numbers(each: Margins) -> Document:
     numbers = {
         "gain_down_to": each.gain[0],
         "gain_up_to": each.gain[1],
@@ -61,13 +70,8 @@ def _margins(each: Margins, part: LawReport) -> Document:
         "disk_gain": each.disk_gain,
         "disk_phase_deg": degrees(each.disk_phase_rad),
     }
-    return {
-        "mode": each.mode,
-        "stable": each.stable,
-        **{name: plain(value) if each.stable else None for name, value in numbers.items()},
-        "grows_s": plain(growth.grows_s) if growth else None,
-        "swings_hz": plain(growth.swings_hz) if growth else None,
-    }
+    named = {name: plain(value) if each.stable else None for name, value in numbers.items()}
+    return {"mode": each.mode, "stable": each.stable, **named}
 
 
 def _certificate(found: Certificate) -> Document:

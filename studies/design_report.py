@@ -12,7 +12,8 @@ if TYPE_CHECKING:
     from controllers.certificate import Certificate
     from controllers.design_file import Design
     from controllers.foresight import Delays
-    from controllers.margins import Margins
+    from controllers.margins import Law, Margins
+    from controllers.scheduled import Schedule
 
 
 @dataclass(frozen=True)
@@ -23,6 +24,7 @@ class LawReport:
     delays       what is late in the loop that the margins are for
     growth       by unstable mode, what its loop does
     certificate  across the modes; it takes what is foreseen as foreseen exactly
+    filtered     margins with the steady Kalman filter of each mode, where that is known
     """
 
     body: str
@@ -30,6 +32,7 @@ class LawReport:
     margins: tuple[Margins, ...]
     growth: dict[str, Growth]
     certificate: Certificate
+    filtered: tuple[Margins, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -75,4 +78,24 @@ def _of_parts(
             margins=by_mode,
             growth={name: growth for name, growth in growing.items() if growth},
             certificate=certificate(exact, sample_time_s),
+            filtered=_filtered(found, laws) if delays.foreseen and not delays.both_s else (),
         )
+
+
+def _filtered(found: Design, laws: Schedule[Law]) -> tuple[Margins, ...]:
+    """Margins on a slide whose estimator has the usual noise; it does not foresee a delay."""
+    from controllers.margins import margins_of
+    from controllers.output_feedback import lqg_law
+    from controllers.scheduled import driven_modes
+    from linearize.standard import SLIDE_MODES
+    from studies.closed_loop_check import PROCESS_NOISE, noise_of
+
+    if found.plant.name not in SLIDE_MODES:
+        return ()
+    noise, sample_time_s = noise_of(found.plant), found.controller.sample_time_s
+    sides = zip(driven_modes(found.hybrid), (laws.forward, laws.backward), strict=True)
+    pairs = (pair for modes, side in sides for pair in zip(modes, side, strict=True))
+    return tuple(
+        margins_of(mode, lqg_law(mode, law, PROCESS_NOISE, noise, sample_time_s), sample_time_s)
+        for mode, law in pairs
+    )

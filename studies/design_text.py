@@ -34,7 +34,12 @@ NO_LAWS = (
     "no margins: the law is the plant's own model, not one linear law per mode; `workbench check` "
     "says what the whole plant makes of it"
 )
-ALL_STATES = "all states are taken as known, no estimator is in the loop"
+ALL_STATES = (
+    "all states are taken as known, no estimator is in the loop: margins of full-state feedback"
+)
+FILTERED = (
+    "the same with the steady Kalman filter of each mode in the loop, for the noise of `check`:"
+)
 MEASURED = (
     "the law acts on the measurement itself and foresees nothing, as under `check --estimator raw`"
 )
@@ -50,20 +55,28 @@ def design_texts(found: DesignReport) -> Iterator[str]:
     elif not found.laws:
         yield NO_LAWS
     for part in found.laws:
-        yield margins_text(part.margins, part.delays, unstable_text(part.growth))
+        clock = made.sample_time_s
+        yield margins_text(part.margins, part.delays, unstable_text(part.growth), clock)
+        if part.filtered:
+            yield f"{FILTERED}\n{columns(HEAD, [_row(each) for each in part.filtered])}"
         yield certificate_text(part.certificate)
 
 
 def margins_text(
-    found: Iterable[Margins], delays: Delays | None = None, unstable: str = UNSTABLE
+    found: Iterable[Margins],
+    delays: Delays | None = None,
+    unstable: str = UNSTABLE,
+    sample_time_s: float = 0.0,
 ) -> str:
     """One line per mode, a dash where the loop has no such margin, and what is in the loop.
 
-    ``unstable`` says what an unstable loop does, and is told where there is one.
+    A ``sample_time_s`` of 0 is not told.  ``unstable`` says what an unstable loop does, and is told
+    where there is one.
     """
     found = [*found]
     lines = [columns(HEAD, [_row(each) for each in found])]
-    lines += [] if delays is None else [_in_the_loop(delays)]
+    sampled = f"sampled every {1e3 * sample_time_s:g} ms, " if sample_time_s else ""
+    lines += [] if delays is None else [sampled + _in_the_loop(delays)]
     lines += [] if delays is None or delays.foreseen else [DRY]
     lines += [] if all(each.stable for each in found) else [unstable]
     return "\n".join(lines)
@@ -106,7 +119,7 @@ def certificate_text(found: Certificate) -> str:
 def search_text(made: HybridMpc) -> str:
     """What a hybrid MPC searches, and where each pair of held commands leads."""
     spec, pairs = made.spec, len(made.search.plans(0).switches) ** 2
-    held = number(1e3 * spec.hold_s, 3)
+    held = number(1e3 * spec.held * spec.sample_time_s, 3)
     lines = [f"of {pairs} pairs of plans over {spec.horizon} samples, {held} ms between switches:"]
     judged = f"{spec.judged} of the best and of those near the last plan"
     lines.append(f"ranked on affine modes; {judged} are judged as they are at a sample that ranks;")

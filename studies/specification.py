@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
-from math import inf, isfinite
+from math import inf, isfinite, isnan, nan
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,16 @@ from controllers.condensed import MpcSpec
 from controllers.spec import replaced
 from linearize.axes import stroke_m
 from linearize.standard import POSITION, PRESSURES, SHIFT_MODES, SLIDE_MODES, SUPPLY, VELOCITY
-from studies.following import BENCHES, FOLLOWING_LINES, STEP_LINES
+from studies.asked_lines import (
+    ALL_LINES,
+    ARRIVED,
+    EVERYWHERE,
+    LONGEST_S,
+    MOVING,
+    SHIFT_LINES,
+    SLIDE_LINES,
+)
+from studies.following import BENCHES
 from studies.following_check import Followed, tasks_of
 from studies.scenarios import SCENARIOS
 from studies.shift_check import SHIFTS
@@ -36,32 +45,7 @@ LIMITS = "limits"
 OVERSHOOT = "overshoot"
 PERCENT = ("%", "percent")
 
-SLIDE_LINES = {
-    "rise_time": "rise_s",
-    "settling_time": "settling_s",
-    OVERSHOOT: "overshoot_m",
-    "final_error": "final_error_m",
-    "limit_cycle": "limit_cycle_m",
-    "tracking_error": "rmse_m",
-    "air": "air_kg",
-    "switches": "switches",
-}
-"""Field of :class:`studies.closed_loop_metrics.Metrics` by the line that asks for it."""
-
-SHIFT_LINES = {
-    "rise_time": "rise_s",
-    "settling_time": "settling_s",
-    OVERSHOOT: "overshoot_m",
-    "final_error": "final_error_m",
-    "impact_speed": "impact_m_s",
-    "air": "air_kg",
-    "switches": "switches",
-}
-"""Likewise of :class:`studies.shift_check.Shift`."""
-
-ALL_LINES = {*SLIDE_LINES, *SHIFT_LINES, *FOLLOWING_LINES, *STEP_LINES}
-EVERYWHERE = ("air_kg", "switches")  # all else asks for an end at rest, or for none
-MOVING = ("rmse_m", "rmse_rad", "largest_error_m", "largest_error_rad")
+MISPLACED = "stands inside [{}]; move it above the tables"
 
 
 @dataclass(frozen=True)
@@ -83,8 +67,13 @@ class Asked:
     scale: Scale
 
     def found(self, row: Any, record: LoopRecord) -> float:
-        """The figure of a run; NaN where it has none, as the rise of a step that never rose."""
+        """The figure of a run; NaN where it has none.
+
+        So for a step that never rose: an axis that stays where it is neither overshoots nor swings.
+        """
         figures = row.figures if isinstance(row, Followed) else vars(row)
+        if self.figure.startswith(ARRIVED) and isnan(figures.get("rise_s", 0.0)):
+            return nan
         return figures[self.figure] if self.figure in figures else getattr(row, self.figure)
 
     def excess(self, found: float) -> float:
@@ -238,6 +227,9 @@ def _figures(
             if most < 0.0 or (figure == "switches" and most != round(most)):
                 whole = "a whole number" if figure == "switches" else "a quantity"
                 text.wrong((name,), f"is {typed}", expected=f"{whole} from 0")
+            if si_unit(figure) == "s" and not 0.0 < most <= LONGEST_S:
+                expected = f"a time above 0, to {LONGEST_S:g} s"
+                text.wrong((name,), f"is {typed}", expected=expected)
             yield Asked(name, figure, -inf, most, tuple(scenarios), unit, shown_in)
 
 
@@ -245,6 +237,9 @@ def _limits(text: RigText, rig: Rig, scenarios: tuple[str, ...]) -> Iterator[Ask
     known = {public_name(name): name for name in rig.plant.lean().model.states}
     for name, typed in text.flat(LIMITS).items():
         place = (LIMITS, name)
+        if name in ALL_LINES:
+            text.wrong(place, MISPLACED.format(LIMITS))
+            continue
         if name not in known:
             text.unknown(place, rig.plant.name, known)
             continue
@@ -281,10 +276,15 @@ def _quantity(
 
 def _numbers(text: RigText, method: str) -> Mapping[str, Any]:
     """Numbers of a design, with the complaints of its specification placed in the file."""
+    spec = CONTROLLERS[method].spec()
+    known = {f"{method}.{number}" for number in _names(spec)}
     try:
-        replaced(CONTROLLERS[method].spec(), text.tree[method], method)
+        replaced(spec, text.tree[method], method)
     except InputError as error:
         for each in error.messages:
             line = text.line(tuple(each.name.split(".")))
-            text.messages.append(replace(each, file=text.file, line=line))
+            table, _, key = each.name.rpartition(".")
+            misplaced = key in ALL_LINES and each.name not in known
+            told = Message(MISPLACED.format(table), key) if misplaced else each
+            text.messages.append(replace(told, file=text.file, line=line))
     return text.tree[method]

@@ -113,3 +113,32 @@ def test_figures_close_the_first_and_the_worst_loops_again_and_no_others(lq, mon
 
     assert set(found.figures()) == {"closed_loop_step", "influences", "spread"}
     assert again == [0, found.document["robustness"][0]["worst_run"] - 1]
+
+
+@pytest.mark.parametrize(("rise_s", "code"), [(float("nan"), 1), (0.1, 0)])
+def test_a_step_that_never_rose_overshoots_swings_and_settles_out_of_specification(
+    lq, monkeypatch, tmp_path, rise_s, code
+):
+    """A drive that stayed 53 mm off was in specification: it neither overshot nor swung."""
+    stays = metrics(rise_s=rise_s, overshoot_m=0.0, limit_cycle_m=0.0)
+    monkeypatch.setattr(Loops, "once", lambda loops, plant, seed: Check((stays,), (record(),)))
+    rig, spec = tmp_path / "rig.toml", tmp_path / "spec.toml"
+    rig.write_text('plant = "servo_drive"\n')
+    spec.write_text('overshoot = "2 mm"\nlimit_cycle = "0.1 mm"\nair = "4 g"\n')
+    answer = call("check", rig, lq, "--spec", spec, "--scenario", "step", "-q")
+
+    assert answer.exit_code == code
+    told = "not reached: step\nout of specification: overshoot, limit_cycle\n"
+    assert answer.stderr == (told if code else "")
+
+
+def test_of_several_runs_those_whose_step_never_rose_are_counted(lq, monkeypatch):
+    def heavy_stays(loops, plant, seed):
+        stays = plant.values[MASS] > RIG.plant.values[MASS]
+        return Check((metrics(rise_s=float("nan") if stays else 0.1),), (record(),))
+
+    monkeypatch.setattr(Loops, "once", heavy_stays)
+    found = check_rig(RIG, lq, ["ekf"], ["step"], runs=9)
+    heavy = sum(drawn_plant(RIG, k).values[MASS] > RIG.plant.values[MASS] for k in range(9))
+
+    assert found.unreached == (f"step in {heavy} of 9 runs",)

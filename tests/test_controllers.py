@@ -120,7 +120,7 @@ def test_a_design_file_of_before_the_later_numbers_still_builds_its_controller(t
 def test_a_wrong_number_in_a_design_is_an_error_that_names_it():
     with pytest.raises(InputError, match=r"lq.positon_m: .*did you mean 'position_m'\?"):
         design("lq", servo_drive(), {"positon_m": 1e-3})
-    with pytest.raises(InputError, match=r"lq\.position_m: is 'far'; expected a number above 0"):
+    with pytest.raises(InputError, match=r"lq\.position_m: is 'far'; expected a number from 1e-06"):
         design("lq", servo_drive(), {"position_m": "far"})
     with pytest.raises(KeyError, match="no controller lqg; there is pid, lq, mpc, cascade, hybrid"):
         design("lqg", servo_drive())

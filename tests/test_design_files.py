@@ -47,7 +47,7 @@ def refused(place, content):
         ("= 2.4", "= nan", "slide.mass_kg: is nan; expected a number from 0.001, in kg"),
         ("slide.mass_kg", "slide.mas_kg", "did you mean 'slide.mass_kg'?"),
         ("position_m = 0.0015", 'position_m = "far"',
-         "lq.position_m: is 'far'; expected a number above 0"),
+         "lq.position_m: is 'far'; expected a number from 1e-06"),
         ("band_m", "bnd_m", "did you mean 'band_m'?"),
         ("sample_time_s = 0.002", "sample_time_s = 0.0015",
          "sample_time_s: is 0.0015; expected a multiple of the 0.001 s"),

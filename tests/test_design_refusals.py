@@ -26,9 +26,15 @@ def rig(tmp_path_factory):
         ),
         (
             "lq",
-            "position_m = 1e-30",
-            "spec.toml:2: lq.position_m: is 1e-30, farthest of all numbers from usual",
+            "opening_v = 1e-30",
+            "spec.toml:2: lq.opening_v: is 1e-30, farthest of all numbers from usual",
         ),
+        (
+            "lq",
+            "position_m = 1e-12",
+            "spec.toml:2: lq.position_m: is 1e-12; expected a number from 1e-06",
+        ),
+        ("axis-lq", "position = 1e-12", "axis-lq.position: is 1e-12; expected a number from 1e-05"),
         ("lq", "position_m = 1e30\nsample_time_s = 0.05", "a number nearer to the usual 0.0015"),
         ("mpc", "position_m = 1e30", "mpc.position_m: is 1e+30, farthest of all numbers"),
     ],
@@ -44,6 +50,34 @@ def test_no_design_is_written_where_a_number_leads_nowhere(rig, tmp_path, method
     assert answer.exit_code == 2
     assert said in answer.stderr and len(answer.stderr.splitlines()) == 1
     assert [p.name for p in tmp_path.iterdir()] == ["spec.toml"]
+
+
+def test_fine_weights_are_told_by_their_small_margins_and_not_by_words_of_a_library(rig, tmp_path):
+    """scipy's "ill-conditioned matrix" was of coordinates, whose choice proves nothing."""
+    spec = tmp_path / "spec.toml"
+    spec.write_text("[lq]\nposition_m = 1e-5\n")
+    made = tmp_path / "design.toml"
+    answer = call("design", rig, "--controller", "lq", "--spec", spec, "-o", made, "-q")
+
+    assert answer.exit_code == 0
+    assert "ill-conditioned" not in answer.stderr
+    assert "warning: the smallest phase margin is 26.3 deg in mode 'charge b slide - near a'" in (
+        answer.stderr
+    )
+
+
+def test_numbers_of_another_method_are_said_not_to_be_used(rig, tmp_path):
+    spec = tmp_path / "spec.toml"
+    for text, said in (
+        ("[cascade]\nbandwidth_hz = 10.0\n", "[cascade] is not for lq, and not used"),
+        ("[lq]\nopening_v = 0.3\n", ""),
+    ):
+        spec.write_text(text)
+        made = tmp_path / "design.toml"
+        answer = call("design", rig, "--controller", "lq", "--spec", spec, "-o", made, "-q")
+
+        assert answer.exit_code == 0
+        assert answer.stderr == (f"warning: {spec}: {said}\n" if said else "")
 
 
 def test_no_design_is_written_where_nothing_can_be_told_of_it(rig, tmp_path, monkeypatch):

@@ -9,6 +9,7 @@ from controllers.pid import PidSpec, pid_gain
 from controllers.scheduled import driven_modes
 from linearize.standard import standard_modes
 from studies.closed_loop_check import check
+from workbench.errors import InputError
 from workbench.plants.servo_drive import servo_drive
 
 
@@ -30,6 +31,11 @@ def test_the_proportional_gain_is_a_share_of_where_the_sampled_loop_begins_to_sw
             return np.abs(np.linalg.eigvals(closed(mode, gain.law(dt, spec.filter_s), dt))).max()
 
         assert radius(0.99) < 1.0 < radius(1.01)
+
+
+def test_a_bandwidth_is_refused_with_the_method_that_is_tuned_to_one():
+    with pytest.raises(InputError, match=r"pid\.bandwidth_hz: .*; `axis-pid` is tuned"):
+        design("pid", servo_drive(), {"bandwidth_hz": 3.0})
 
 
 def test_a_design_file_of_before_has_a_stable_loop_in_every_mode():

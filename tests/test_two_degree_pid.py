@@ -6,7 +6,7 @@ from math import pi, radians
 import numpy as np
 import pytest
 
-from controllers.derivative import LowPassDerivative, SpanDerivative, settled
+from controllers.derivative import LowPassDerivative, SpanDerivative
 from controllers.margins import both_ways_s, margins_of
 from controllers.pid_tuning import (
     PAPER_GAINS,
@@ -45,44 +45,14 @@ def drive():
     return standard_modes(servo_drive())
 
 
-def filtered(derivative, values):
-    A, B, C, D = derivative.filter(DT)
-    memory, slopes = settled((A, B, C, D), values[0]), []
-    for value in values:
-        slopes.append(C @ memory + D * value)
-        memory = A @ memory + B * value
-    return np.array(slopes)
-
-
-@pytest.mark.parametrize("derivative", BOTH)
-def test_a_derivative_is_nothing_at_rest_and_the_slope_of_a_ramp(derivative):
-    values = 0.3 + 0.2 * DT * np.maximum(np.arange(60) - 10, 0)
-    slopes = filtered(derivative, values)
-
-    assert slopes[:11] == pytest.approx(0.0, abs=1e-12)
-    assert slopes[-1] == pytest.approx(0.2, rel=1e-4)
-
-
-def test_the_derivative_over_several_periods_is_that_difference():
-    values = np.random.default_rng(1).standard_normal(40)
-    slopes = filtered(SpanDerivative(7), values)
-
-    assert slopes[7:] == pytest.approx((values[7:] - values[:-7]) / (7 * DT))
-
-
-def test_noise_on_the_slope_falls_with_the_periods_over_which_it_is_taken():
-    noise = np.random.default_rng(2).standard_normal(4000)
-    spread = [filtered(SpanDerivative(n), noise)[20:].std() for n in (1, 4, 16)]
-
-    assert spread[0] / spread[1] == pytest.approx(4.0, rel=0.05)
-    assert spread[0] / spread[2] == pytest.approx(16.0, rel=0.05)
-
-
 def steps(pid, reference, positions):
-    """Openings and commands along given positions; the reference stands still."""
+    """Openings and commands along given positions; the reference stands, or has one per position.
+
+    What comes is not seen: each is held for all of the preview.
+    """
     command, found = pid.start(), []
-    held = np.full((1, pid.preview), reference)
-    for y in positions:
+    for r, y in zip(np.broadcast_to(reference, len(positions)), positions, strict=True):
+        held = np.full((1, pid.preview), r)
         command = pid.step(command, held, Estimate((pid.signal,), np.array([y]), np.zeros((1, 1))))
         found.append((command.notes["opening_v"], float(command.value[0])))
     return np.array(found).T
@@ -90,10 +60,31 @@ def steps(pid, reference, positions):
 
 def test_proportional_integral_and_setpoint_weight_are_what_they_say(rig):
     gains = PidGains(proportional=20.0, integral=5.0, derivative=0.0, setpoint=0.4)
-    openings, _ = steps(pid_with(rig, gains), 0.09, [0.08] * 3)
+    openings, _ = steps(pid_with(rig, gains), [0.08, *[0.09] * 3], [0.08] * 4)
 
-    direct = 20.0 * (0.4 * 0.09 - 0.08)
-    assert openings == pytest.approx([direct + 5.0 * 0.01 * DT * k for k in (1, 2, 3)])
+    direct = 20.0 * 0.4 * 0.01
+    assert openings[0] == pytest.approx(0.0, abs=1e-12)
+    assert openings[1:] == pytest.approx([direct + 5.0 * 0.01 * DT * k for k in (1, 2, 3)])
+
+
+def test_an_axis_at_rest_on_its_target_stays_there_whatever_the_setpoint_weight(rig):
+    """P alone sent -(1 - b) K_p r: the drive of the bench ended its step 53 mm away."""
+    gains = PidGains(proportional=20.0, integral=5.0, derivative=0.1, setpoint=0.4)
+    openings, _ = steps(pid_with(rig, gains), 0.09, [0.09] * 50)
+
+    assert openings == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_setpoint_weight_is_kept_where_the_gains_change_with_the_mode(rig):
+    """On the target the integral takes over what P loses there, and moves nothing."""
+    soft = PidGains(proportional=10.0, integral=5.0, derivative=0.0, setpoint=0.4)
+    hard = PidGains(proportional=60.0, integral=50.0, derivative=0.0, setpoint=0.4)
+    sides = Schedule(np.array([0.08, 0.08001]), (soft, hard), (soft, hard))
+    path = [0.079] * 5 + [0.081] * 5
+    openings, _ = steps(pid_with(rig, sides), 0.079, path)
+
+    assert openings[:5] == pytest.approx(0.0, abs=1e-12)
+    assert openings[5:] == pytest.approx(-10.0 * 0.002, rel=0.03)
 
 
 def test_gains_that_change_with_the_mode_leave_the_opening_where_it_was(rig):

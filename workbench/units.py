@@ -218,7 +218,8 @@ def split(text: Any, name: str) -> tuple[str, str]:
     if unit.startswith(","):
         raise UnitError(f"'{text}' has a comma; expected a decimal point")
     if not unit and si_unit(name):
-        raise UnitError(f"'{text}' has no unit; expected {_example(name, found[1])}")
+        example = _example(name, *[number] * isfinite(float(number)))
+        raise UnitError(f"'{text}' has no unit; expected {example}")
     return number, unit
 
 

@@ -24,8 +24,8 @@ from studies.command_line.application import (
 from studies.command_line.files import writable, write_json
 
 if TYPE_CHECKING:
+    from studies.checked_runs import CheckedRuns
     from studies.specification import Specification
-    from studies.verdicts import Judged
     from workbench.rig import Rig
 
 DesignFile = Annotated[Path, typer.Argument(metavar="DESIGN", help="What `design` wrote.")]
@@ -44,7 +44,8 @@ def check(
         typer.Option(
             "--estimator",
             metavar="NAME",
-            help="ekf (usual), ukf, imm, mhe, kalman; not for shifts; by mode: ekf,ukf@stick.",
+            help="ekf (usual), ukf, imm, mhe, kalman; by mode: ekf,ukf@stick; raw: the measurement "
+            "itself, for axis-pid; not for shifts.",
         ),
     ] = None,
     scenario: Annotated[
@@ -98,7 +99,7 @@ def check(
             say("drawing")
             say(f"figures, tables and {report_check(found, noted, figures, command_text())}")
         if found.judged:
-            tell_missed(found.judged)
+            tell_missed(found)
         elif not found.met:
             typer.echo(found.found.goal, err=True)
         if not found.met:
@@ -117,7 +118,9 @@ def _asked(spec: Path, rig: "Rig", scenarios: Iterable[str]) -> "Specification":
     return found
 
 
-def tell_missed(judged: "Judged") -> None:
-    """Name on stderr the lines that some run does not meet."""
-    if not judged.met:
-        typer.echo(f"out of specification: {', '.join(judged.missed)}", err=True)
+def tell_missed(found: "CheckedRuns") -> None:
+    """Name on stderr the steps that never come near, and the lines that some run does not meet."""
+    if found.unreached:
+        typer.echo(f"not reached: {', '.join(found.unreached)}", err=True)
+    if found.judged and not found.judged.met:
+        typer.echo(f"out of specification: {', '.join(found.judged.missed)}", err=True)

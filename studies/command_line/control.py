@@ -109,6 +109,7 @@ def design(
         from controllers.design_file import design as design_controller
         from controllers.design_file import gains, write_design
         from studies.design_document import design_document
+        from studies.design_doubts import design_doubts
         from studies.design_report import design_report
         from studies.design_text import design_texts
         from studies.sample_times import require_multiple
@@ -119,6 +120,9 @@ def design(
         known = load_rig(rig)
         asked = read_specification(spec, known) if spec else None
         numbers = design_numbers(asked, controller, known.plant) if asked else {}
+        if unused := [name for name in (asked.numbers if asked else ()) if name != controller]:
+            tables = " and ".join(f"[{name}]" for name in unused)
+            typer.echo(f"warning: {spec}: {tables} is not for {controller}, and not used", err=True)
         say(f"designing {controller}")
         with _placed_in(spec):
             found = design_controller(controller, known.plant, numbers)
@@ -132,13 +136,15 @@ def design(
             typer.echo(f"{name}: {gain}")
         for part in design_texts(report):
             typer.echo(part)
+        for doubt in design_doubts(report):
+            typer.echo(f"warning: {doubt}", err=True)
         typer.echo(f"wrote {output}")
         if asked and asked.asked:
             from studies.checked_runs import check_rig
 
-            judged = check_rig(known, output, spec=asked, say=say).judged
-            typer.echo("\n" + judged.text)
-            tell_missed(judged)
+            checked = check_rig(known, output, spec=asked, say=say)
+            typer.echo("\n" + checked.judged.text)
+            tell_missed(checked)
 
 
 @contextmanager
