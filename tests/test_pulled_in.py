@@ -11,8 +11,8 @@ from studies.hidden_effects import answer, recordings
 from studies.truth.cases import read_cases
 from workbench.fitting.gauss_newton import fit_windows
 from workbench.fitting.linearised import Point
-from workbench.fitting.problem import FAR, ITERATIONS
-from workbench.fitting.pulled_in import pulled_in
+from workbench.fitting.problem import ITERATIONS
+from workbench.fitting.pulled_in import FAR, pulled_in
 from workbench.fitting.unknowns import WIDE, nominal_unknowns
 
 ADDED = "friction.viscous_n_s_m"  # stands for what was added: it is given no prior

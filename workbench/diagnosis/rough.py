@@ -125,11 +125,12 @@ def _distinct(trials: tuple[Trial, ...], most: int) -> list[Trial]:
 def _starts(
     problem: Problem, windows: Windows, unknowns: Unknowns, profile: Profile, most: int
 ) -> list[list[Point]]:
-    """Points near the base, and where it has moved far points at the priors.
+    """Points near the base, and points at the priors.
 
     Near the base: the best trials with more and less of the linear step of the nuisances.  At the
     priors: all trials, since the base may have moved its parameters to imitate what is missing, and
-    then the size that is best there is too small.
+    then the size that is best there is too small.  How many deviations that are says nothing: under
+    wide priors little does as much.
     """
     base = problem.base
     starts = carried(base.point.starts, base.windows, windows)
@@ -141,6 +142,4 @@ def _starts(
 
     trials = _distinct(profile.trials, most)
     near = [point(base.point.t + share * t.nuisance, t) for t in trials for share in SHARES]
-    if not problem.moved_far:
-        return [near]
     return [near, [point(problem.at_priors, trial) for trial in profile.trials]]

@@ -132,14 +132,13 @@ def scan_catalogue(problem: Problem) -> list[Profile]:
 
 
 def scan_from_priors(problem: Problem) -> list[Profile]:
-    """The same where no parameter has moved yet; nothing where the prior fit moved none far.
+    """The same where no parameter has moved yet.
 
     Parameters that imitate an effect hide it from a scan at the prior fit: what an underlap lets
-    through, a leak and another heat flow together do too, several deviations off their priors.
+    through, a leak and another heat flow together do too, several deviations off their priors, or
+    within them where they are wide.
     Its leaders alone are asked for: half the windows of the other scan are enough.
     """
-    if not problem.moved_far:
-        return []
     base = problem.base
     windows, kept = base.windows.part(max(len(base.windows) // 4, FEWEST_FROM_PRIORS))
     point = Point(problem.at_priors, base.point.starts[:, kept])

@@ -26,7 +26,6 @@ from workbench.rig import Rig
 FIRST_ITERATIONS = 3  # with scales from the model as it came
 LEAST_HELD_OUT_WINDOWS = 24
 NO_EVIDENCE = "a validation recording is one of the training recordings, which proves nothing"
-FAR = 1.5  # prior deviations: beyond, a parameter may imitate what is missing
 LEAST_IMPROVEMENT = 0.03  # of the misfit, for a prior fit to be taken up again
 
 
@@ -78,11 +77,6 @@ class Problem:
         own = {candidate.strength for candidate in self.added}
         mine = [name in own for name in self.base.unknowns.names]
         return np.where(mine, self.base.point.t, 0.0)
-
-    @property
-    def moved_far(self) -> bool:
-        """True where the prior fit has moved a parameter so far that it may imitate an effect."""
-        return bool(np.any(np.abs(self.base.point.t - self.at_priors) > FAR))
 
     @property
     def linearised(self) -> Linearised:
