@@ -246,12 +246,18 @@ def rows_of(forced: np.ndarray) -> np.ndarray:
     N, n = forced.shape[1], len(STATES)
     rows = np.zeros((N + 2 * SLACKS * N + SLACKS, N + SLACKS))
     rows[:N, :N], rows[-SLACKS:, N:] = np.eye(N), np.eye(SLACKS)
-    for side, sign in enumerate((1.0, -1.0)):
-        soft = rows[N * (1 + side * SLACKS) :][: N * SLACKS]
+    for where, sign in zip(soft_rows(N), (1.0, -1.0), strict=True):
+        soft = rows[where]
         soft[: n * N, :N] = (forced.reshape(N, n, N) / SLACK_UNIT[:, None]).reshape(-1, N)
         soft[: n * N, N:-1] = np.tile(sign * np.eye(n), (N, 1))
         soft[n * N :, :N], soft[n * N :, -1] = moves_of(N), sign
     return rows
+
+
+def soft_rows(N: int) -> tuple[slice, slice]:
+    """Rows of what is soft below and above: the states of all samples, then the N moves."""
+    below, above, end = (N * (1 + side * SLACKS) for side in range(3))
+    return slice(below, above), slice(above, end)
 
 
 @cache

@@ -22,7 +22,7 @@ import numpy as np
 from controllers.axis import Axis
 from controllers.margins import Law, both_ways_s, unforeseen_s
 from controllers.on_measurement import OnMeasurement
-from controllers.scheduled import Schedule, driven_modes
+from controllers.scheduled import Schedule, with_modes
 from linearize.discrete import sampled
 from linearize.modes import HybridModel, Mode
 from workbench.contracts import Controller
@@ -60,15 +60,11 @@ def foreseeing(
 ) -> Schedule[Law]:
     """The laws of all driven modes, each behind the foresight of its mode."""
     delay_s = command_delay_s(hybrid.plant.effects)
-    pairs = zip(driven_modes(hybrid, axis), (laws.forward, laws.backward), strict=True)
-    sides = (
-        tuple(
-            foresighted(mode, law, sample_time_s, delay_s)
-            for mode, law in zip(modes, side, strict=True)
-        )
-        for modes, side in pairs
-    )
-    return Schedule(laws.positions_m, *sides)
+
+    def ahead(mode: Mode, law: Law) -> Law:
+        return foresighted(mode, law, sample_time_s, delay_s)
+
+    return with_modes(hybrid, laws, ahead, axis)
 
 
 def foresighted(mode: Mode, law: Law, sample_time_s: float, delay_s: float) -> Law:

@@ -35,7 +35,7 @@ from time import perf_counter
 
 import numpy as np
 
-from controllers.condensed import SLACKS, MpcSpec, Program, limits_of, program_of
+from controllers.condensed import SLACKS, MpcSpec, Program, limits_of, program_of, soft_rows
 from controllers.margins import Law
 from controllers.motion import PREVIEW
 from controllers.positioning import STATES, Memory, Positioning, Task, positioning
@@ -70,9 +70,7 @@ class Plan:
         if self.multipliers is None:
             return False
         n, states = len(self.openings), len(STATES)
-        below, above = (
-            self.multipliers[n * (1 + side * SLACKS) :][: n * states] for side in (0, 1)
-        )
+        below, above = (self.multipliers[rows][: n * states] for rows in soft_rows(n))
         held = (below + above).reshape(n, states).sum(axis=0)
         return bool((held * PUSHED * np.sign(force) > ROUNDED).any())
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import starmap
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -85,6 +86,18 @@ def driven_modes(hybrid: HybridModel, axis: Axis | None = None) -> tuple[list[Mo
         if speed * drive > 0.0:
             sides[speed < 0.0].append(mode)
     return tuple(sorted(side, key=lambda mode: mode.box[axis.position].point) for side in sides)
+
+
+def with_modes(
+    hybrid: HybridModel,
+    designs: Schedule[Design],
+    change: Callable[[Mode, Design], Other],
+    axis: Axis | None = None,
+) -> Schedule[Other]:
+    """The schedule of what is made of each driven mode and its design."""
+    pairs = zip(driven_modes(hybrid, axis), (designs.forward, designs.backward), strict=True)
+    sides = (tuple(starmap(change, zip(modes, side, strict=True))) for modes, side in pairs)
+    return Schedule(designs.positions_m, *sides)
 
 
 def scheduled(

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from studies.following import FOLLOWING_LINES, STEP_LINES
 
+OVERSHOOT = "overshoot"
+
 SLIDE_LINES = {
     "rise_time": "rise_s",
     "settling_time": "settling_s",
-    "overshoot": "overshoot_m",
+    OVERSHOOT: "overshoot_m",
     "final_error": "final_error_m",
     "limit_cycle": "limit_cycle_m",
     "tracking_error": "rmse_m",
@@ -19,7 +21,7 @@ SLIDE_LINES = {
 SHIFT_LINES = {
     "rise_time": "rise_s",
     "settling_time": "settling_s",
-    "overshoot": "overshoot_m",
+    OVERSHOOT: "overshoot_m",
     "final_error": "final_error_m",
     "impact_speed": "impact_m_s",
     "air": "air_kg",
@@ -30,5 +32,5 @@ SHIFT_LINES = {
 ALL_LINES = {*SLIDE_LINES, *SHIFT_LINES, *FOLLOWING_LINES, *STEP_LINES}
 EVERYWHERE = ("air_kg", "switches")  # all else asks for an end at rest, or for none
 LONGEST_S = 3600.0  # no run is nearly as long
-ARRIVED = ("overshoot", "limit_cycle")  # of a step that never rose there is none to speak of
+ARRIVED = (OVERSHOOT, "limit_cycle")  # of a step that never rose there is none to speak of
 MOVING = ("rmse_m", "rmse_rad", "largest_error_m", "largest_error_rad")

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from controllers.foresight import Delays
     from controllers.margins import Law, Margins
     from controllers.scheduled import Schedule
+    from linearize.modes import Mode
 
 
 @dataclass(frozen=True)
@@ -84,18 +85,18 @@ def _of_parts(
 
 def _filtered(found: Design, laws: Schedule[Law]) -> tuple[Margins, ...]:
     """Margins on a slide whose estimator has the usual noise; it does not foresee a delay."""
-    from controllers.margins import margins_of
+    from controllers.margins import margins
     from controllers.output_feedback import lqg_law
-    from controllers.scheduled import driven_modes
+    from controllers.scheduled import with_modes
     from linearize.standard import SLIDE_MODES
     from studies.closed_loop_check import PROCESS_NOISE, noise_of
 
     if found.plant.name not in SLIDE_MODES:
         return ()
     noise, sample_time_s = noise_of(found.plant), found.controller.sample_time_s
-    sides = zip(driven_modes(found.hybrid), (laws.forward, laws.backward), strict=True)
-    pairs = (pair for modes, side in sides for pair in zip(modes, side, strict=True))
-    return tuple(
-        margins_of(mode, lqg_law(mode, law, PROCESS_NOISE, noise, sample_time_s), sample_time_s)
-        for mode, law in pairs
-    )
+
+    def behind_filter(mode: Mode, law: Law) -> Law:
+        return lqg_law(mode, law, PROCESS_NOISE, noise, sample_time_s)
+
+    filtered = with_modes(found.hybrid, laws, behind_filter)
+    return tuple(margins(found.hybrid, filtered, sample_time_s))

@@ -26,6 +26,7 @@ from studies.asked_lines import (
     EVERYWHERE,
     LONGEST_S,
     MOVING,
+    OVERSHOOT,
     SHIFT_LINES,
     SLIDE_LINES,
 )
@@ -42,7 +43,6 @@ from workbench.rig_text import RigText, read_text
 from workbench.units import Scale, UnitError, public_name, quantity, scale, si_unit, split
 
 LIMITS = "limits"
-OVERSHOOT = "overshoot"
 PERCENT = ("%", "percent")
 
 MISPLACED = "stands inside [{}]; move it above the tables"

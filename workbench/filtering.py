@@ -84,8 +84,8 @@ def consistent_start(plant: Plant, known: Mapping[str, float]) -> np.ndarray:
     chambers = [owner for owner, _, what in owners if what == MASS and owner in parts]
     temperatures = model.quantities(*(f"{c}.{TEMPERATURE}" for c in chambers))
     before = temperatures(x, u, d, p).full().ravel()
-    for i in (model.states.index(f"{c}.{PRESSURE}") for c in chambers):
-        x[i] = min(x[i], _highest_supply_pa(plant))
+    pressures = [model.states.index(f"{chamber}.{PRESSURE}") for chamber in chambers]
+    x[pressures] = np.minimum(x[pressures], _highest_supply_pa(plant))
     for i, name in enumerate(model.states):
         if np.isfinite(known.get(name, np.nan)):
             x[i] = known[name]

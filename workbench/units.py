@@ -218,7 +218,7 @@ def split(text: Any, name: str) -> tuple[str, str]:
     if unit.startswith(","):
         raise UnitError(f"'{text}' has a comma; expected a decimal point")
     if not unit and si_unit(name):
-        example = _example(name, *[number] * isfinite(float(number)))
+        example = _example(name, number) if isfinite(float(number)) else _example(name)
         raise UnitError(f"'{text}' has no unit; expected {example}")
     return number, unit
 

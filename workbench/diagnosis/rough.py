@@ -84,7 +84,7 @@ def _from_larger(
     larger = sorted((t for t in profile.trials if _beyond(t, best)), key=lambda t: t.size)
     if not larger:
         return []
-    (points,) = _starts(problem, windows, unknowns, replace(profile, trials=(larger[0],)), 1)[:1]
+    points, _ = _starts(problem, windows, unknowns, replace(profile, trials=(larger[0],)), 1)
     start = points_costs(windows, unknowns, points).best
     return [fit_windows(windows, unknowns, start, 2 * ITERATIONS)]
 
@@ -124,7 +124,7 @@ def _distinct(trials: tuple[Trial, ...], most: int) -> list[Trial]:
 
 def _starts(
     problem: Problem, windows: Windows, unknowns: Unknowns, profile: Profile, most: int
-) -> list[list[Point]]:
+) -> tuple[list[Point], list[Point]]:
     """Points near the base, and points at the priors.
 
     Near the base: the best trials with more and less of the linear step of the nuisances.  At the
@@ -142,4 +142,4 @@ def _starts(
 
     trials = _distinct(profile.trials, most)
     near = [point(base.point.t + share * t.nuisance, t) for t in trials for share in SHARES]
-    return [near, [point(problem.at_priors, trial) for trial in profile.trials]]
+    return near, [point(problem.at_priors, trial) for trial in profile.trials]
