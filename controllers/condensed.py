@@ -80,20 +80,20 @@ class Program:
     z holds the N openings, one slack per state and one for the rate.  Stacked predictions are
     X = free x + forced U + drift + pushed f, with X of shape (4 N,) and a force f on the slide.
 
-    H, rows             shapes (n_z, n_z) and (n_c, n_z)
+    Its hessian H, shape (n_z, n_z), and its rows, shape (n_c, n_z), follow from the rest.
+
     free, forced        shapes (4 N, 4) and (4 N, N)
     drift, pushed       shapes (4 N,)
     Q                   cost of the stacked states, shape (4 N, 4 N)
-    state_limits        lower and upper of the states over the horizon in units of the slack,
-                        shape (2, 4 N)
+    R, S                cost of an opening and of its change
+    state_limits        lower and upper of the states over the horizon, shape (2, 4 N)
     openings            smallest and largest opening
     move_v              largest change of the opening from sample to sample, soft
+    slack_weight        cost of a violation that grows as its square
     slack_price         cost of a violation that grows in proportion
     solver              what solves it at its limits
     """
 
-    H: np.ndarray
-    rows: np.ndarray
     free: np.ndarray
     forced: np.ndarray
     drift: np.ndarray
@@ -104,12 +104,42 @@ class Program:
     state_limits: np.ndarray
     openings: tuple[float, float]
     move_v: float
-    slack_price: float = 0.0
+    slack_weight: float
+    slack_price: float
     solver: Solver = Daqp()
 
     @property
     def horizon(self) -> int:
         return self.forced.shape[1]
+
+    @cached_property
+    def weighed(self) -> np.ndarray:
+        """The costs of the forced states, Q forced, shape (4 N, N)."""
+        N, n = self.horizon, len(STATES)
+        ahead, stage, to_go = self.forced.reshape(N, n, N), self.Q[:n, :n], self.Q[-n:, -n:]
+        return np.concatenate([stage @ ahead[:-1], (to_go @ ahead[-1])[None]]).reshape(n * N, N)
+
+    @cached_property
+    def hessian(self) -> np.ndarray:
+        """Second derivatives of the cost of openings and slacks, shape (n_z, n_z)."""
+        N, moves = self.horizon, moves_of(self.horizon)
+        H = np.diag(np.full(N + SLACKS, 2.0 * self.slack_weight))
+        pull = self.forced.T @ self.weighed
+        H[:N, :N] = 2.0 * (pull + self.R * np.eye(N) + self.S * moves.T @ moves)
+        return H
+
+    @cached_property
+    def rows(self) -> np.ndarray:
+        """What is limited: openings, what is soft below and above, slacks; shape (n_c, n_z)."""
+        N, n = self.horizon, len(STATES)
+        rows = np.zeros((N + 2 * SLACKS * N + SLACKS, N + SLACKS))
+        rows[:N, :N], rows[-SLACKS:, N:] = np.eye(N), np.eye(SLACKS)
+        for where, sign in zip(soft_rows(N), (1.0, -1.0), strict=True):
+            soft = rows[where]
+            soft[: n * N, :N] = self.forced / np.tile(SLACK_UNIT, N)[:, None]
+            soft[: n * N, N:-1] = np.tile(sign * np.eye(n), (N, 1))
+            soft[n * N :, :N], soft[n * N :, -1] = moves_of(N), sign
+        return rows
 
     def unforced(self, x: np.ndarray, force_n: float) -> np.ndarray:
         """Stacked states under zero openings, shape (4 N,)."""
@@ -119,10 +149,8 @@ class Program:
         self, unforced: np.ndarray, targets: np.ndarray, steady_v: float, last_v: float
     ) -> np.ndarray:
         """G for stacked targets (4 N,), the steady opening and the last one."""
-        g = np.zeros(len(self.H))
-        g[self.horizon :] = self.slack_price / PRICED
-        pull = self.forced.T @ (self.Q @ (unforced - targets))
-        g[: self.horizon] = 2.0 * (pull - self.R * steady_v)
+        pull = (unforced - targets) @ self.weighed
+        g = np.concatenate([2.0 * (pull - self.R * steady_v), self.slack_price / PRICED])
         g[0] -= 2.0 * self.S * last_v
         return g
 
@@ -140,7 +168,8 @@ class Program:
     @cached_property
     def sides(self) -> tuple[np.ndarray, np.ndarray]:
         """What :meth:`bounds` gives for states and a last opening of zero."""
-        n, (low, high) = self.horizon, self.state_limits
+        n = self.horizon
+        low, high = self.state_limits / np.tile(SLACK_UNIT, n)
         moved, slack = np.full(n, self.move_v), np.zeros(SLACKS)
         none = np.full(len(low) + n, np.inf)
         first, last = (np.full(n, side) for side in self.openings)
@@ -149,14 +178,26 @@ class Program:
         return np.concatenate(lower), np.concatenate(upper)
 
     def unlimited(self, g: np.ndarray) -> np.ndarray:
-        """The optimum without limits, which needs no slack."""
-        openings = -self.inverse[: self.horizon, : self.horizon] @ g[: self.horizon]
-        return np.append(openings, np.zeros(SLACKS))
+        """The openings that are best without limits, shape (N,); no slack is needed for them."""
+        return -(self.inverse @ g[: self.horizon])
+
+    def keeps(self, openings: np.ndarray, unforced: np.ndarray, last_v: float) -> bool:
+        """Whether openings, shape (N,), keep all limits; not finite, they do not."""
+        (smallest_v, largest_v), (low, high) = self.openings, self.state_limits
+        moves = openings.copy()
+        moves[0] -= last_v
+        moves[1:] -= openings[:-1]
+        if not np.abs(moves).max() <= self.move_v:
+            return False
+        if not (openings.min() >= smallest_v and openings.max() <= largest_v):
+            return False
+        ahead = unforced + self.forced @ openings
+        return bool((ahead >= low).all() and (ahead <= high).all())
 
     @cached_property
     def inverse(self) -> np.ndarray:
-        """Inverse of H, for the optimum without limits."""
-        return np.linalg.inv(self.H)
+        """Inverse of H on the openings, for the optimum without limits, shape (N, N)."""
+        return np.linalg.inv(self.hessian[: self.horizon, : self.horizon])
 
     def law(self, force_n_m_s: float, area_m2: float, sample_time_s: float) -> Law:
         """The first opening without limits; its memory is the integral and the last opening.
@@ -164,7 +205,7 @@ class Program:
         The integral grows into a force: it pushes the prediction and shifts the target pressures.
         """
         n = len(STATES)
-        pull = -2.0 * self.inverse[0, : self.horizon] @ self.forced.T @ self.Q
+        pull = -2.0 * self.inverse[0] @ self.weighed.T
         shift = np.tile([0.0, 0.0, -0.5, 0.5], self.horizon) / area_m2
         integral = force_n_m_s * pull @ (self.pushed - shift)
         error = np.array([sample_time_s, *np.zeros(n - 1)])
@@ -192,7 +233,7 @@ class Program:
 
     def prepared(self) -> Program:
         """The same program with its factors at hand, so that the first sample need not wait."""
-        _ = self.order, self.general, self.inverse, self.sides
+        _ = self.order, self.general, self.inverse, self.sides, self.weighed
         return self
 
 
@@ -220,38 +261,9 @@ def program_of(
     push = sampled(pushed_mode(mode, area_m2), spec.sample_time_s).offset - small.offset
     _, _, pushed = stacked(small.F, small.G, push, N)
     stages = sp.block_diag([Q] * (N - 1) + [to_go]).toarray()
-    ahead = np.tile(limits / SLACK_UNIT, N)
-    move_v = spec.rate_v_s * spec.sample_time_s
-    H = cost_of(forced, Q, to_go, R, S, spec.slack_weight)
-    rows = rows_of(forced)
-    limited = ahead, openings, move_v, spec.slack_price
-    return Program(H, rows, free, forced, drift, pushed, stages, R, S, *limited)
-
-
-def cost_of(
-    forced: np.ndarray, Q: np.ndarray, to_go: np.ndarray, R: float, S: float, slack_weight: float
-) -> np.ndarray:
-    """H of openings and slacks under a response of shape (4 N, N), costs Q and, at last, to_go."""
-    N, n = forced.shape[1], len(Q)
-    ahead = forced.reshape(N, n, N)
-    weighed = np.concatenate([Q @ ahead[:-1], (to_go @ ahead[-1])[None]]).reshape(n * N, N)
-    moves = moves_of(N)
-    H = np.diag(np.full(N + SLACKS, 2.0 * slack_weight))
-    H[:N, :N] = 2.0 * (forced.T @ weighed + R * np.eye(N) + S * moves.T @ moves)
-    return H
-
-
-def rows_of(forced: np.ndarray) -> np.ndarray:
-    """What is limited by openings and slacks: openings, what is soft below and above, slacks."""
-    N, n = forced.shape[1], len(STATES)
-    rows = np.zeros((N + 2 * SLACKS * N + SLACKS, N + SLACKS))
-    rows[:N, :N], rows[-SLACKS:, N:] = np.eye(N), np.eye(SLACKS)
-    for where, sign in zip(soft_rows(N), (1.0, -1.0), strict=True):
-        soft = rows[where]
-        soft[: n * N, :N] = (forced.reshape(N, n, N) / SLACK_UNIT[:, None]).reshape(-1, N)
-        soft[: n * N, N:-1] = np.tile(sign * np.eye(n), (N, 1))
-        soft[n * N :, :N], soft[n * N :, -1] = moves_of(N), sign
-    return rows
+    limited = np.tile(limits, N), openings, spec.rate_v_s * spec.sample_time_s
+    prices = spec.slack_weight, spec.slack_price
+    return Program(free, forced, drift, pushed, stages, R, S, *limited, *prices)
 
 
 def soft_rows(N: int) -> tuple[slice, slice]:

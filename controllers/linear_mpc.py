@@ -124,7 +124,8 @@ class LinearMpc:
         x = estimate.pick(STATES)
         if not np.isfinite(x).all():
             return self._unseen(last)
-        reference = np.clip(reference, *self.places_m)
+        lowest_m, highest_m = self.places_m
+        reference = np.minimum(np.maximum(reference, lowest_m), highest_m)
         now = self.task.task(memory, reference, x, self.sample_time_s)
         if now.rests:
             shut = valve.sent(0.0, estimate)
@@ -167,13 +168,13 @@ class LinearMpc:
         program, unforced = self._predicted(program, now, friction_n - now.rise_n, before)
         targets = self._targets(now, reference, program.horizon, friction_n)
         g = program.gradient(unforced, targets, now.opening_v, last_v)
-        low, high = program.bounds(unforced, last_v)
-        z = program.unlimited(g)
-        at = program.rows @ z
-        if (at >= low).all() and (at <= high).all():
-            plan, notes = Plan(z[: program.horizon], z), {"fallback": 0.0, "iterations": 0.0}
+        openings = program.unlimited(g)
+        if program.keeps(openings, unforced, last_v):
+            primal, notes = np.concatenate([openings, NONE]), {"fallback": 0.0, "iterations": 0.0}
+            plan = Plan(openings, primal)
         else:
-            plan, notes = limited_plan(program, g, low, high, before, now.opening_v)
+            sides = program.bounds(unforced, last_v)
+            plan, notes = limited_plan(program, g, *sides, before, now.opening_v)
         middle = len(STATES) * (program.horizon // 2)
         place_m = float(unforced[middle] + program.forced[middle] @ plan.openings)
         return replace(plan, place_m=place_m), notes
@@ -191,7 +192,7 @@ class LinearMpc:
         limit = self.task.spec.approach_m
         targets = np.empty((n, len(now.target)))
         targets[:] = now.target
-        targets[:, 0] = now.x[0] + np.clip(coming - now.x[0], -limit, limit)
+        targets[:, 0] = np.minimum(np.maximum(coming, now.x[0] - limit), now.x[0] + limit)
         targets[:, 2] -= shift_pa
         targets[:, 3] += shift_pa
         return targets.ravel()

@@ -16,7 +16,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from controllers.condensed import MpcSpec, Program, cost_of, rows_of
+from controllers.condensed import MpcSpec, Program
 from controllers.linear_mpc import LinearMpc, Plan, linear_mpc
 from controllers.positioning import STATES, Task
 from controllers.rollout import Rollout, sliding_advance
@@ -43,11 +43,7 @@ def along(
 ) -> tuple[Program, np.ndarray]:
     """The program along the path of these openings (N,), and its states under zero openings."""
     states, forced = rollout(x, openings, np.array(d))
-    n = len(STATES)
-    slack_weight = program.H[-1, -1] / 2.0
-    costs = program.Q[:n, :n], program.Q[-n:, -n:], program.R, program.S, slack_weight
-    near = replace(program, H=cost_of(forced, *costs), rows=rows_of(forced), forced=forced)
-    return near, states - forced @ openings
+    return replace(program, forced=forced), states - forced @ openings
 
 
 def nonlinear_mpc(hybrid: HybridModel, spec: MpcSpec | None = None) -> NonlinearMpc:

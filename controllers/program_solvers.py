@@ -86,7 +86,7 @@ class Daqp:
         lower, upper = (np.nan_to_num(side, posinf=FAR, neginf=-FAR) for side in (low, high))
         order = np.concatenate([first, rest])
         z, _, flag, info = daqp.solve(
-            program.H,
+            program.hessian,
             g,
             program.general,
             upper[order],
@@ -122,7 +122,7 @@ class Osqp:
             return None
         solver = osqp.OSQP()
         solver.setup(
-            sp.csc_matrix(np.triu(program.H)),
+            sp.csc_matrix(np.triu(program.hessian)),
             g,
             sp.csc_matrix(program.rows),
             low,

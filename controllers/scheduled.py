@@ -6,6 +6,7 @@ directions by how clearly the slide is to move: so nothing jumps when the mode c
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -40,19 +41,26 @@ class Schedule(Generic[Design]):
     backward: tuple[Design, ...]
 
     @cached_property
-    def _numbers(self) -> np.ndarray:
-        """Those of the points, shape (n,)."""
-        return np.arange(len(self.positions_m), dtype=float)
+    def _places(self) -> list[float]:
+        """Those of the points, as bisection reads them fastest."""
+        return self.positions_m.tolist()
+
+    def _between(self, position_m: float) -> tuple[int, int, float]:
+        """The points to the left and right, and the share of the right one."""
+        places, last = self._places, len(self.positions_m) - 1
+        if last == 0:
+            return 0, 0, 0.0
+        left = min(max(bisect_right(places, position_m) - 1, 0), last - 1)
+        share = (position_m - places[left]) / (places[left + 1] - places[left])
+        return left, left + 1, min(max(share, 0.0), 1.0)
 
     def weighted(self, position_m: float, ahead: float) -> Iterator[tuple[float, Design]]:
         """Designs that count here with their weights; ``ahead`` is 1 forward, 0 backward."""
-        last = len(self.positions_m) - 1
-        place = float(np.interp(position_m, self.positions_m, self._numbers))
-        left = min(int(place), last - 1)
-        right_share = place - left
+        left, right, right_share = self._between(position_m)
         for share, designs in ((ahead, self.forward), (1.0 - ahead, self.backward)):
-            yield share * (1.0 - right_share), designs[left]
-            yield share * right_share, designs[left + 1]
+            if share > 0.0:
+                yield share * (1.0 - right_share), designs[left]
+                yield share * right_share, designs[right]
 
     def mapped(self, change: Callable[[Design], Other]) -> Schedule[Other]:
         """The same schedule of what is made of each design."""
@@ -61,7 +69,9 @@ class Schedule(Generic[Design]):
 
     def heaviest(self, position_m: float, ahead: float) -> Design:
         """The design with the largest weight, for what cannot be mixed."""
-        return max(self.weighted(position_m, ahead), key=lambda pair: pair[0])[1]
+        left, right, right_share = self._between(position_m)
+        designs = self.forward if ahead >= 0.5 else self.backward
+        return designs[right if right_share > 0.5 else left]
 
 
 def constant(design: Design) -> Schedule[Design]:

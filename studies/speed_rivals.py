@@ -43,17 +43,15 @@ def limited(programs: Sequence[Program], number: int, seed: int = 0) -> Iterator
         unforced = program.unforced(x, 0.0)
         targets = np.tile([place_m, 0.0, 5e5, 5e5], program.horizon)
         g = program.gradient(unforced, targets, 0.0, 0.0)
-        low, high = program.bounds(unforced, 0.0)
-        at = program.rows @ program.unlimited(g)
-        if (at < low).any() or (at > high).any():
-            yield program, g, low, high
+        if not program.keeps(program.unlimited(g), unforced, 0.0):
+            yield program, g, *program.bounds(unforced, 0.0)
 
 
 def exact(program: Program, g: np.ndarray, low: np.ndarray, high: np.ndarray) -> float:
     """The first opening by cvxpy and Clarabel."""
     import cvxpy as cp
 
-    z, root = cp.Variable(len(g)), np.linalg.cholesky(program.H).T
+    z, root = cp.Variable(len(g)), np.linalg.cholesky(program.hessian).T
     below, above = np.isfinite(low), np.isfinite(high)
     sides = [program.rows[below] @ z >= low[below], program.rows[above] @ z <= high[above]]
     cost = 0.5 * cp.sum_squares(root @ z) + g @ z
@@ -70,7 +68,7 @@ def kept_osqp(cases: Sequence[Limited]) -> tuple[np.ndarray, np.ndarray]:
     for program, g, low, high in cases:
         if id(program) not in solvers:
             solver = solvers[id(program)] = osqp.OSQP()
-            H, rows = sp.csc_matrix(np.triu(program.H)), sp.csc_matrix(program.rows)
+            H, rows = sp.csc_matrix(np.triu(program.hessian)), sp.csc_matrix(program.rows)
             solver.setup(H, g, rows, low, high, **LOOSER)
 
     def solved(case: Limited) -> float:

@@ -137,7 +137,7 @@ def test_mpc_without_limits_and_move_cost_is_the_regulator(hybrid):
 
     def first_move(x):
         g = program.gradient(program.unforced(x, 0.0), np.tile(REST, 7), 0.0, 0.0)
-        return -(program.inverse @ g)[0]
+        return program.unlimited(g)[0]
 
     for away in np.diag([1e-3, 0.1, 1e4, 1e4]):
         assert first_move(REST + away) - first_move(REST) == pytest.approx(-(K @ away)[0], rel=1e-3)
@@ -172,7 +172,7 @@ def test_mpc_replays_a_run_at_its_limits_to_the_last_bit(hybrid, controller):
     program = fresh.programs.forward[1]
     limited_plan(
         program,
-        np.full(len(program.H), np.nan),
+        np.full(len(program.hessian), np.nan),
         *program.bounds(program.unforced(states[0], 0.0), 0.3),
         None,
         0.0,
@@ -188,7 +188,8 @@ def test_mpc_falls_back_on_its_last_plan(controller):
     before = controller.step(controller.start(), held(controller, 0.16), seen(REST)).memory.plan
     low, high = program.bounds(program.unforced(REST, 0.0), 0.0)
 
-    plan, notes = limited_plan(program, np.full(len(program.H), np.nan), low, high, before, 0.0)
+    unknown = np.full(len(program.hessian), np.nan)
+    plan, notes = limited_plan(program, unknown, low, high, before, 0.0)
 
     assert notes["fallback"] == 1.0
     assert plan.openings[:-1] == pytest.approx(before.openings[1:])

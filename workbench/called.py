@@ -64,14 +64,24 @@ def prepared(function: ca.Function) -> Callable[..., list[np.ndarray]]:
 
 
 class Curve:
-    """A function of one number and one value, called at every sample as :func:`prepared` does."""
+    """A function of one number and one value for every sample, without checks or new arrays.
+
+    Not for several threads.
+    """
 
     def __init__(self, function: ca.Function) -> None:
         self._function = function
-        self._call = prepared(function)
+        self._given, self._found = np.zeros(1), np.zeros(1)
+        self._buffer, self._evaluate = function.buffer()
+        self._buffer.set_arg(0, memoryview(self._given))
+        self._buffer.set_res(0, memoryview(self._found))
 
     def __call__(self, value: float) -> float:
-        return float(self._call(np.array([value], dtype=float))[0][0])
+        self._given[0] = value
+        self._evaluate()
+        if self._buffer.ret():
+            raise RuntimeError(f"{self._function.name()} failed")
+        return float(self._found[0])
 
     def __reduce__(self) -> tuple[type[Curve], tuple[ca.Function]]:
         """Another process makes its own buffer."""
