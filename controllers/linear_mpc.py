@@ -15,9 +15,8 @@ less to violate it.  The reference counts as far as the position may go, and the
 where velocity or pressures are at a limit towards which it pushes, as at an end of the valve: a
 slide that a limit leaves too little force to break away stands still.
 
-The mode is that of the place to which the last plan leads in half a horizon.  Where a state is not
-finite, the solver has no answer, or its answer comes after the deadline, the last plan goes on, and
-the notes say so.
+The mode is that of the place to which the last plan leads in half a horizon.  Where the solver has
+no answer, or its answer comes after the deadline, the last plan goes on, and the notes say so.
 
 Where the unconstrained optimum keeps all limits it is the solution, and no solver is asked.  At the
 limits it is DAQP unless another one is given, see :mod:`controllers.program_solvers`.
@@ -41,6 +40,7 @@ from controllers.motion import PREVIEW
 from controllers.positioning import STATES, Memory, Positioning, Task, positioning
 from controllers.program_solvers import Daqp, Solver, Start
 from controllers.scheduled import Schedule, scheduled
+from controllers.unseen import waiting
 from linearize.modes import HybridModel
 from linearize.reduction import closed_command
 from workbench.contracts import Command, Estimate
@@ -119,11 +119,10 @@ class LinearMpc:
     def start(self) -> Command:
         return Command(self.task.valve.shut, Memory())
 
+    @waiting
     def step(self, last: Command, reference: np.ndarray, estimate: Estimate) -> Command:
         begun, memory, valve = self.clock(), last.memory, self.task.valve
         x = estimate.pick(STATES)
-        if not np.isfinite(x).all():
-            return self._unseen(last)
         lowest_m, highest_m = self.places_m
         reference = np.minimum(np.maximum(reference, lowest_m), highest_m)
         now = self.task.task(memory, reference, x, self.sample_time_s)
@@ -143,18 +142,6 @@ class LinearMpc:
         notes = {"resting": 0.0, "opening_v": opening, "integral_m_s": integral, **notes}
         notes["late"] = float(late)
         return Command(valve.sent(opening, estimate), Memory(integral, False, plan), notes)
-
-    def _unseen(self, last: Command) -> Command:
-        """The command where the estimate is not finite: the last plan goes on, or the valve shuts.
-
-        The spool is not led, since it is not known either.
-        """
-        memory, valve = last.memory, self.task.valve
-        if memory.plan is None:
-            return Command(valve.shut, memory, {"fallback": 1.0, "late": 0.0})
-        plan = memory.plan.shifted()
-        notes = {"opening_v": float(plan.openings[0]), "fallback": 1.0, "late": 0.0}
-        return Command(valve.command(plan.openings[0]), replace(memory, plan=plan), notes)
 
     def _solved(
         self, now: Task, reference: np.ndarray, memory: Memory, integral: float

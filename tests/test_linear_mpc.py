@@ -228,17 +228,6 @@ def test_a_late_first_answer_leaves_the_valve_at_the_steady_opening(controller):
     assert abs(command.notes["opening_v"]) < 0.05
 
 
-def test_an_estimate_that_is_not_finite_lets_the_last_plan_go_on(controller):
-    lost, reference = seen([np.nan] * 4), held(controller, 0.16)
-    first = controller.step(controller.start(), reference, seen(REST))
-    command = controller.step(first, reference, lost)
-
-    assert (command.notes["fallback"], command.notes["late"]) == (1.0, 0.0)
-    assert command.notes["opening_v"] == first.memory.plan.openings[1]
-    shut = controller.step(controller.start(), reference, lost)
-    assert shut.value == pytest.approx([4.95]) and shut.notes["fallback"] == 1.0
-
-
 def test_the_mode_is_that_of_the_place_to_which_the_last_plan_leads(controller):
     """Just before a boundary of modes at speed: the first sample has no plan, the second has."""
     edge_m = controller.programs.positions_m[:2].mean()

@@ -60,7 +60,7 @@ def held(controller, last, reference, lost, samples):
     return last
 
 
-@pytest.mark.parametrize("method", ["lq", "axis-pid", "feedback-linearisation"])
+@pytest.mark.parametrize("method", ["lq", "mpc", "axis-pid", "feedback-linearisation"])
 def test_the_last_command_holds_for_a_few_samples_and_then_the_valve_shuts(method):
     controller, _, seen, reference = begun(method)
     before = controller.step(controller.start(), reference + 0.05, seen)
