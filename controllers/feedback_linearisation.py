@@ -42,7 +42,7 @@ GRID = 17  # openings among which the wanted jerk is bracketed, twice
 class LinearisingSpec:
     """All poles at -rate_per_s; the direction of friction is mixed as in a regulator."""
 
-    rate_per_s: float = 50.0
+    rate_per_s: float = 100.0
     integral_share: float = 0.1
     sample_time_s: float = 1e-3
     turn_speed: float = 0.02
@@ -56,7 +56,7 @@ class LinearisingSpec:
 class AxisLinearisingSpec:
     """As :class:`LinearisingSpec`, in ranges of the axis: for any unit; ``sliding`` per second."""
 
-    rate_per_s: float = 50.0
+    rate_per_s: float = 100.0
     integral_share: float = ranged(0.1)
     sample_time_s: float = 1e-3
     sliding: float = 0.5

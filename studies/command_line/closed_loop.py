@@ -51,7 +51,7 @@ def check(
     scenario: Annotated[
         list[str] | None,
         typer.Option(
-            "--scenario", metavar="NAME", help="step, sine; n-h, h-n, ...; as named; all."
+            "--scenario", metavar="NAME", help="step, sine; n-h, h-n, ...; as named. [default: all]"
         ),
     ] = None,
     runs: Annotated[int, typer.Option("--runs", metavar="N", min=1, help="Plants to draw.")] = 1,
