@@ -167,6 +167,10 @@ class CheckedRuns:
                     rows += [replace(row, design=self._design(number)) for row in found.rows]
                     records += found.records
         figures = styled_figures(kind(tuple(rows), tuple(records)))
+        if self.spec:
+            from studies.figures.limits import limit_figures
+
+            figures |= limit_figures(self.spec.asked, rows, records)
         if len(self.rows) > FEW:
             from studies.figures.robustness import influence_figure, spread_figure
 

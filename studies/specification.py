@@ -81,10 +81,17 @@ class Asked:
         return max(self.least - found, found - self.most) if isfinite(found) else inf
 
     @property
+    def ends(self) -> tuple[float, ...]:
+        """What bounds the figure, in SI, the lower one first if there is one."""
+        if self.least == -inf or (self.least == -self.most and si_unit(self.figure) == "Pa"):
+            return (self.most,)  # no absolute pressure is below 0
+        return (self.least, self.most)
+
+    @property
     def text(self) -> str:
         """What is asked for, in words."""
-        if self.least == -inf or (self.least == -self.most and si_unit(self.figure) == "Pa"):
-            return f"at most {self.shown(self.most)}"  # no absolute pressure is below 0
+        if len(self.ends) == 1:
+            return f"at most {self.shown(self.most)}"
         return f"{number(self.scale.from_si(self.least))} to {self.shown(self.most)}"
 
     def shown(self, value: float) -> str:

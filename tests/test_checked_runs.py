@@ -85,7 +85,7 @@ def test_a_check_writes_its_tables_and_a_report_with_parameters_and_seeds(
     assert all(word in told for word in lines[0])
     assert r"\toprule" in (folder / "tables" / "table_1.tex").read_text()
     page = (folder / "report.html").read_text()
-    assert page.count("<svg") == 3
+    assert page.count("<svg") == 4 and (folder / "limits_step.svg").exists()
     for word in ("slide.mass", "3.21", "seed (0, k - 1)", np.__version__, "positioning"):
         assert word in page
 

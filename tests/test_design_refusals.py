@@ -71,6 +71,7 @@ def test_numbers_of_another_method_are_said_not_to_be_used(rig, tmp_path):
     for text, said in (
         ("[cascade]\nbandwidth_hz = 10.0\n", "[cascade] is not for lq, and not used"),
         ("[lq]\nopening_v = 0.3\n", ""),
+        ("[lq]\nopening_v = 0.3\n[cascade]\nbandwidth_hz = 10.0\n", ""),  # shared by both
     ):
         spec.write_text(text)
         made = tmp_path / "design.toml"

@@ -11,13 +11,17 @@ from studies.closed_loop_check import Check
 from studies.closed_loop_figures import check_figures
 from studies.figures.delays import delay_figure
 from studies.figures.fidelity import fidelity_figure
+from studies.figures.limits import limit_figures
 from studies.figures.mode_count import mode_count_figure
 from studies.figures.panels import Line, Panel, panels_figure
 from studies.figures.robustness import influence_figure, spread_figure
 from studies.figures.style import new_figure, save, styled
 from studies.robustness import Line as Asked
 from studies.robustness import Robustness
+from studies.specification import read_specification
+from workbench.plants.servo_drive import servo_drive
 from workbench.recording import Recording
+from workbench.rig import default_rig
 
 X = np.linspace(0.0, 1.0, 50)
 
@@ -46,9 +50,25 @@ def robust(make):
 
 
 MARKS = ("RMSE (mm)", "overshoot (mm)")
+
+
+def limited():
+    """Two runs against a limit both ways, and one of a pressure, which has no lower side."""
+    names, rows = ("slide.velocity_m_s", "chamber_a.pressure_pa"), []
+    for design in ("pid", "lq"):
+        rows.append((SimpleNamespace(design=design, scenario="step"), 1e5 * X))
+    records = [
+        SimpleNamespace(recording=Recording("run", 1e-3, dict.fromkeys(names, x))) for _, x in rows
+    ]
+    text = '[limits]\n"slide.velocity" = "1 m/s"\n"chamber_a.pressure" = "6 bar"\n'
+    asked = read_specification(text, default_rig(servo_drive())).asked
+    return limit_figures(asked, [row for row, _ in rows], records)["limits_step"]
+
+
 CURVES = {name: {mark: [1.0, 2.0, 3.0] for mark in MARKS} for name in ("lq", "pid")}
 FIGURES = {
     "closed loops": closed_loops,
+    "limits": limited,
     "spread": lambda: robust(lambda r: spread_figure(r, {"rise": 3.0, "error (mm)": 2.0})),
     "influences": lambda: robust(influence_figure),
     "delays": lambda: delay_figure([0, 1, 2], CURVES, {"lq": (1.0, 1.5), "pid": (np.nan, np.nan)}),
@@ -105,3 +125,12 @@ def test_a_panel_has_one_line_in_the_table_where_its_label_has_two(tmp_path):
     save(figure, tmp_path / "one", "x")
 
     assert (tmp_path / "one.csv").read_text().splitlines()[1] == "valve command (V),line,0,0"
+
+
+def test_a_limit_is_drawn_on_each_side_that_it_has_in_the_unit_that_was_typed():
+    velocity, pressure = limited().axes
+
+    heights = [[float(line.get_ydata()[0]) for line in a.lines if line.get_linestyle() == ":"]
+               for a in (velocity, pressure)]  # fmt: skip
+    assert heights[0] == pytest.approx([-1.0, 1.0]) and heights[1][-1] == pytest.approx(6.0)
+    assert len(pressure.lines) == 3 and velocity.get_ylabel() == "slide.velocity (m/s)"

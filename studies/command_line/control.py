@@ -114,15 +114,17 @@ def design(
         from studies.design_text import design_texts
         from studies.sample_times import require_multiple
         from studies.specification import design_numbers, read_specification
+        from workbench.errors import listed
         from workbench.rig import load_rig
 
         writable(output, json)
         known = load_rig(rig)
         asked = read_specification(spec, known) if spec else None
         numbers = design_numbers(asked, controller, known.plant) if asked else {}
-        if unused := [name for name in (asked.numbers if asked else ()) if name != controller]:
-            tables = " and ".join(f"[{name}]" for name in unused)
-            typer.echo(f"warning: {spec}: {tables} is not for {controller}, and not used", err=True)
+        if asked and asked.numbers and controller not in asked.numbers:
+            tables, are = asked.numbers, "are" if len(asked.numbers) > 1 else "is"
+            told = f"{listed([f'[{name}]' for name in tables])} {are} not for {controller}"
+            typer.echo(f"warning: {spec}: {told}, and not used", err=True)
         say(f"designing {controller}")
         with _placed_in(spec):
             found = design_controller(controller, known.plant, numbers)
