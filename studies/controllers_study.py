@@ -1,7 +1,8 @@
 """Study ``controllers``: what the designs reach on drawn plants.
 
-On the servo drive all of them against published results; on rig, arm, leg and soft joint the best
-one against what is asked of it, see :mod:`studies.followers`.
+On the servo drive all of them, and feedback linearisation beside them, against published results;
+on rig, arm, leg and soft joint the best one against what is asked of it, see
+:mod:`studies.followers`.
 """
 
 from __future__ import annotations
@@ -52,6 +53,7 @@ DESIGNS: dict[str, tuple[str, Mapping[str, Any]]] = {
     "pid": ("pid", {}),
     "mpc": ("mpc", {}),
     "nonlinear-mpc": ("nonlinear-mpc", {}),
+    "feedback-linearisation": ("feedback-linearisation", {}),
 }
 """Method and numbers of each design, the first being the one that is to hold."""
 SPREAD = 95.0  # per cent of the draws within twice the limit

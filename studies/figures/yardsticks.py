@@ -15,6 +15,7 @@ from studies.figures.style import (
     PAGE_IN,
     PURPLE,
     RED,
+    SKY,
     new_figure,
     styled,
 )
@@ -22,8 +23,9 @@ from studies.figures.style import (
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-LOOKS = ((BLUE, "o"), (RED, "s"), (GREEN, "^"), (PURPLE, "D"), (ORANGE, "v"))  # of a design
-APART = 0.18  # of the distance between payloads
+LOOKS = ((BLUE, "o"), (RED, "s"), (GREEN, "^"), (PURPLE, "D"), (ORANGE, "v"), (SKY, "P"))
+"""Colour and marker of each design."""
+APART = 0.15  # of the distance between payloads
 
 
 def yardstick_figure(
