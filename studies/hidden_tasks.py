@@ -19,8 +19,7 @@ QUICK_SEED = 1  # and of it every so many-th task of each plant and kind,
 QUICK_EVERY = 5
 SLOW = "gearbox"  # of which a diagnosis takes minutes: one
 LAW_SEED = 1  # each law once
-WIDTH_SEED = 1  # on the servo drive,
-EVERY = 2  # and of its effects every second
+WIDTH_SEED = 1  # on the servo drive
 
 
 @dataclass(frozen=True)
@@ -91,12 +90,12 @@ def _weak() -> Iterator[Task]:
 
 
 def _widths() -> Iterator[Task]:
-    """One seed of the servo drive's effects once more, every second one."""
+    """One seed of the servo drive's effects once more."""
     truth = SERVO_DRIVE.truth
     stored = read_cases(truth.stored).values()
-    hidden = [c for c in stored if c.seed == WIDTH_SEED and c.hidden in truth.hidden]
-    for case in hidden[::EVERY]:
-        yield Task(Kind.WIDTH, (case,))
+    for case in stored:
+        if case.seed == WIDTH_SEED and case.hidden in truth.hidden:
+            yield Task(Kind.WIDTH, (case,))
 
 
 def alone(task: Task) -> Task:
