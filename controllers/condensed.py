@@ -150,9 +150,9 @@ class Program:
     ) -> np.ndarray:
         """G for stacked targets (4 N,), the steady opening and the last one."""
         pull = (unforced - targets) @ self.weighed
-        g = np.concatenate([2.0 * (pull - self.R * steady_v), self.slack_price / PRICED])
-        g[0] -= 2.0 * self.S * last_v
-        return g
+        pull -= self.R * steady_v
+        pull[0] -= self.S * last_v
+        return np.concatenate([2.0 * pull, self.slack_price / PRICED])
 
     def bounds(self, unforced: np.ndarray, last_v: float) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper side of the rows: openings, what is soft twice, slacks."""

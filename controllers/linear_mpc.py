@@ -46,6 +46,7 @@ from linearize.reduction import closed_command
 from workbench.contracts import Command, Estimate
 
 PUSHED = np.array([0.0, 1.0, 1.0, -1.0])  # ways of velocity and pressures as the slide is pushed
+AGAINST = np.array([0.0, 0.0, -1.0, 1.0])  # ways of the states that balance a push
 ROUNDED = 1e-3  # cost per unit of a slack: multipliers below are rounding of a solver
 NONE = np.zeros(SLACKS)  # no limit is violated
 
@@ -164,7 +165,7 @@ class LinearMpc:
             plan, notes = limited_plan(program, g, *sides, before, now.opening_v)
         middle = len(STATES) * (program.horizon // 2)
         place_m = float(unforced[middle] + program.forced[middle] @ plan.openings)
-        return replace(plan, place_m=place_m), notes
+        return Plan(plan.openings, plan.primal, place_m, plan.multipliers), notes
 
     def _predicted(
         self, program: Program, now: Task, force_n: float, before: Plan | None
@@ -178,10 +179,8 @@ class LinearMpc:
         coming = reference[0, 1 : n + 1] if now.speed_m_s else np.full(n, reference[0, 0])
         limit = self.task.spec.approach_m
         targets = np.empty((n, len(now.target)))
-        targets[:] = now.target
+        targets[:] = now.target + shift_pa * AGAINST
         targets[:, 0] = np.minimum(np.maximum(coming, now.x[0] - limit), now.x[0] + limit)
-        targets[:, 2] -= shift_pa
-        targets[:, 3] += shift_pa
         return targets.ravel()
 
 

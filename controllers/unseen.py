@@ -56,8 +56,11 @@ def waiting(step: Step) -> Step:
 
     @wraps(step)
     def waits(self: Controller, last: Command, reference: np.ndarray, seen: Estimate) -> Command:
-        waited = last.memory if isinstance(last.memory, Unseen) else Unseen(last.memory, 0)
-        before = Command(last.value, waited.memory, last.notes)
+        before, waited = last, last.memory
+        if isinstance(waited, Unseen):
+            before = Command(last.value, waited.memory, last.notes)
+        else:
+            waited = Unseen(last.memory, 0)
         if np.isfinite(seen.state).all():
             return step(self, before, reference, seen)
         try:
