@@ -23,6 +23,7 @@ from workbench.plant import Plant
 
 SLACK_UNIT = np.array([1e-3, 0.1, 1e4, 1e4])  # m, m/s, Pa, Pa: violations that cost alike
 PRICED = np.array([10.0, 1.0, 1.0, 1.0, 0.1])  # 10 mm, ..., 0.1 V: they have the same price
+BALANCING = np.array([0.0, 0.0, -0.5, 0.5])  # pressures that balance a push, per push and area
 SLACKS = len(STATES) + 1  # one per state, and one for the rate of the opening, in V per sample
 LONGEST = 500  # samples ahead; the program is dense, and grows with the square
 
@@ -204,11 +205,10 @@ class Program:
 
         The integral grows into a force: it pushes the prediction and shifts the target pressures.
         """
-        n = len(STATES)
         pull = -2.0 * self.inverse[0] @ self.weighed.T
-        shift = np.tile([0.0, 0.0, -0.5, 0.5], self.horizon) / area_m2
+        shift = np.tile(BALANCING, self.horizon) / area_m2
         integral = force_n_m_s * pull @ (self.pushed - shift)
-        error = np.array([sample_time_s, *np.zeros(n - 1)])
+        error = sample_time_s * np.eye(len(STATES))[0]
         C = np.array([integral, 2.0 * self.S * self.inverse[0, 0]])
         D = pull @ self.free + integral * error
         return Law(np.array([[1.0, 0.0], C]), np.array([error, D]), C, D)
@@ -233,7 +233,7 @@ class Program:
 
     def prepared(self) -> Program:
         """The same program with its factors at hand, so that the first sample need not wait."""
-        _ = self.order, self.general, self.inverse, self.sides, self.weighed
+        _ = self.general, self.inverse, self.sides
         return self
 
 

@@ -34,7 +34,15 @@ from time import perf_counter
 
 import numpy as np
 
-from controllers.condensed import SLACKS, MpcSpec, Program, limits_of, program_of, soft_rows
+from controllers.condensed import (
+    BALANCING,
+    SLACKS,
+    MpcSpec,
+    Program,
+    limits_of,
+    program_of,
+    soft_rows,
+)
 from controllers.margins import Law
 from controllers.motion import PREVIEW
 from controllers.positioning import STATES, Memory, Positioning, Task, positioning
@@ -46,7 +54,6 @@ from linearize.reduction import closed_command
 from workbench.contracts import Command, Estimate
 
 PUSHED = np.array([0.0, 1.0, 1.0, -1.0])  # ways of velocity and pressures as the slide is pushed
-AGAINST = np.array([0.0, 0.0, -1.0, 1.0])  # ways of the states that balance a push
 ROUNDED = 1e-3  # cost per unit of a slack: multipliers below are rounding of a solver
 NONE = np.zeros(SLACKS)  # no limit is violated
 
@@ -175,11 +182,10 @@ class LinearMpc:
 
     def _targets(self, now: Task, reference: np.ndarray, n: int, friction_n: float) -> np.ndarray:
         """Stacked targets, shape (4 N,): the coming reference as far off as the approach allows."""
-        shift_pa = friction_n / (2.0 * self.task.area_m2)
         coming = reference[0, 1 : n + 1] if now.speed_m_s else np.full(n, reference[0, 0])
         limit = self.task.spec.approach_m
         targets = np.empty((n, len(now.target)))
-        targets[:] = now.target + shift_pa * AGAINST
+        targets[:] = now.target + friction_n / self.task.area_m2 * BALANCING
         targets[:, 0] = np.minimum(np.maximum(coming, now.x[0] - limit), now.x[0] + limit)
         return targets.ravel()
 

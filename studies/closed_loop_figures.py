@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from linearize.standard import POSITION
 from studies.closed_loop_check import Check
-from studies.figures.style import PAGE_IN, new_figure
+from studies.figures.style import LINES, PAGE_IN, new_figure
 from studies.scenarios import LATE_S
 from studies.text import number
 
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
     from workbench.closed_loop import LoopRecord
 
-LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1)), (0, (3, 1)), (0, (1, 1)))
 A_STEP = 20.0  # an error beyond so many times the range of interest is the step itself
 WIDER = 1.1  # than the error that is to be seen
 

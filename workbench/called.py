@@ -34,9 +34,7 @@ def called(function: ca.Function, *arguments: object) -> tuple[np.ndarray, ...]:
         buffer.set_arg(k, memoryview(values))
     for k, values in enumerate(results):
         buffer.set_res(k, memoryview(values))
-    evaluate()
-    if buffer.ret():
-        raise RuntimeError(f"{function.name()} failed")
+    _evaluated(function, buffer, evaluate)
     return tuple(_dense(function.sparsity_out(k), values) for k, values in enumerate(results))
 
 
@@ -55,9 +53,7 @@ def prepared(function: ca.Function) -> Callable[..., list[np.ndarray]]:
             buffer.set_arg(k, memoryview(values))
         for k, values in enumerate(results):
             buffer.set_res(k, memoryview(values))
-        evaluate()
-        if buffer.ret():
-            raise RuntimeError(f"{function.name()} failed")
+        _evaluated(function, buffer, evaluate)
         return results
 
     return call
@@ -78,9 +74,7 @@ class Curve:
 
     def __call__(self, value: float) -> float:
         self._given[0] = value
-        self._evaluate()
-        if self._buffer.ret():
-            raise RuntimeError(f"{self._function.name()} failed")
+        _evaluated(self._function, self._buffer, self._evaluate)
         return float(self._found[0])
 
     def __reduce__(self) -> tuple[type[Curve], tuple[ca.Function]]:
@@ -91,6 +85,15 @@ class Curve:
 def result(function: ca.Function, *arguments: object) -> np.ndarray:
     """The first result of :func:`called`."""
     return called(function, *arguments)[0]
+
+
+def _evaluated(
+    function: ca.Function, buffer: ca.FunctionBuffer, evaluate: Callable[[], None]
+) -> None:
+    """Run what reads and writes the arrays of a buffer, and say so where it fails."""
+    evaluate()
+    if buffer.ret():
+        raise RuntimeError(f"{function.name()} failed")
 
 
 def _column_major(function: ca.Function, place: int, value: object) -> np.ndarray:

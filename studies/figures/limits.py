@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from studies.figures.panels import Line, Panel, panels_figure
-from studies.figures.style import PAGE_IN
+from studies.figures.style import LINES, PAGE_IN
 from studies.specification import Limit
 
 if TYPE_CHECKING:
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from workbench.closed_loop import LoopRecord
     from workbench.recording import Recording
 
-LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1)), (0, (3, 1)), (0, (1, 1)))
 PANEL_IN, LEGEND_IN = 1.5, 0.7
 ROOM = 0.1  # of the range shown, above and below
 

@@ -28,7 +28,7 @@ PURPLE, SKY, BLACK, GREY = "#CC79A7", "#56B4E9", "#000000", "0.6"
 MOST_POINTS = 2000  # of a curve; more are not seen and swell the files
 
 _COLOURS = (BLUE, RED, GREEN, ORANGE, PURPLE, SKY, BLACK)
-_LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1)), (0, (3, 1)), (0, (1, 1)))
+LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1)), (0, (3, 1)), (0, (1, 1)))
 
 
 @contextmanager
@@ -37,7 +37,7 @@ def styled() -> Iterator[None]:
     import matplotlib
     from cycler import cycler
 
-    cycle = cycler(color=_COLOURS) + cycler(linestyle=_LINES)
+    cycle = cycler(color=_COLOURS) + cycler(linestyle=LINES)
     style = {
         "font.family": "STIXGeneral",
         "mathtext.fontset": "stix",
