@@ -34,17 +34,11 @@ from time import perf_counter
 
 import numpy as np
 
-from controllers.condensed import (
-    BALANCING,
-    SLACKS,
-    MpcSpec,
-    Program,
-    limits_of,
-    program_of,
-    soft_rows,
-)
+from controllers.condensed import BALANCING, Program, program_of
 from controllers.margins import Law
 from controllers.motion import PREVIEW
+from controllers.mpc_limits import limits_of, soft_rows
+from controllers.mpc_spec import MpcSpec
 from controllers.positioning import STATES, Memory, Positioning, Task, positioning
 from controllers.program_solvers import Daqp, Solver, Start
 from controllers.scheduled import Schedule, scheduled
@@ -55,7 +49,6 @@ from workbench.contracts import Command, Estimate
 
 PUSHED = np.array([0.0, 1.0, 1.0, -1.0])  # ways of velocity and pressures as the slide is pushed
 ROUNDED = 1e-3  # cost per unit of a slack: multipliers below are rounding of a solver
-NONE = np.zeros(SLACKS)  # no limit is violated
 
 
 @dataclass(frozen=True)
@@ -63,34 +56,31 @@ class Plan:
     """The last solution.
 
     openings      those ahead, shape (N,)
-    primal        the whole z
     place_m       the place half-way
-    multipliers   of the rows; None where no limit was met
+    start         where a solver may begin: what was active is likely to be so a sample later;
+                  None where no limit was met
     """
 
     openings: np.ndarray
-    primal: np.ndarray
     place_m: float = nan
-    multipliers: np.ndarray | None = None
+    start: Start | None = None
 
     def against(self, force: float) -> bool:
         """Whether velocity or pressures are at a limit towards which such a force pushes."""
-        if self.multipliers is None:
+        if self.start is None:
             return False
         n, states = len(self.openings), len(STATES)
-        below, above = (self.multipliers[rows][: n * states] for rows in soft_rows(n))
+        below, above = (self.start.multipliers[rows][: n * states] for rows in soft_rows(n))
         held = (below + above).reshape(n, states).sum(axis=0)
         return bool((held * PUSHED * np.sign(force) > ROUNDED).any())
-
-    @property
-    def start(self) -> Start | None:
-        """Where a solver may begin: what was active is likely to be so a sample later."""
-        return None if self.multipliers is None else Start(self.primal, self.multipliers)
 
     def shifted(self) -> Plan:
         """The same plan a sample later, its last opening held."""
         kept = np.append(self.openings[1:], self.openings[-1])
-        return replace(self, openings=kept, primal=np.append(kept, self.primal[len(kept) :]))
+        if self.start is None:
+            return replace(self, openings=kept)
+        z = np.append(kept, self.start.z[len(kept) :])
+        return replace(self, openings=kept, start=self.start._replace(z=z))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -165,14 +155,13 @@ class LinearMpc:
         g = program.gradient(unforced, targets, now.opening_v, last_v)
         openings = program.unlimited(g)
         if program.keeps(openings, unforced, last_v):
-            primal, notes = np.concatenate([openings, NONE]), {"fallback": 0.0, "iterations": 0.0}
-            plan = Plan(openings, primal)
+            plan, notes = Plan(openings), {"fallback": 0.0, "iterations": 0.0}
         else:
-            sides = program.bounds(unforced, last_v)
+            sides = program.limits.bounds(unforced, last_v)
             plan, notes = limited_plan(program, g, *sides, before, now.opening_v)
         middle = len(STATES) * (program.horizon // 2)
         place_m = float(unforced[middle] + program.forced[middle] @ plan.openings)
-        return Plan(plan.openings, plan.primal, place_m, plan.multipliers), notes
+        return Plan(plan.openings, place_m, plan.start), notes
 
     def _predicted(
         self, program: Program, now: Task, force_n: float, before: Plan | None
@@ -182,11 +171,12 @@ class LinearMpc:
 
     def _targets(self, now: Task, reference: np.ndarray, n: int, friction_n: float) -> np.ndarray:
         """Stacked targets, shape (4 N,): the coming reference as far off as the approach allows."""
-        coming = reference[0, 1 : n + 1] if now.speed_m_s else np.full(n, reference[0, 0])
-        limit = self.task.spec.approach_m
         targets = np.empty((n, len(now.target)))
         targets[:] = now.target + friction_n / self.task.area_m2 * BALANCING
-        targets[:, 0] = np.minimum(np.maximum(coming, now.x[0] - limit), now.x[0] + limit)
+        if now.speed_m_s:
+            limit = self.task.spec.approach_m
+            coming = np.maximum(reference[0, 1 : n + 1], now.x[0] - limit)
+            targets[:, 0] = np.minimum(coming, now.x[0] + limit)
         return targets.ravel()
 
 
@@ -202,15 +192,14 @@ def limited_plan(
     n = program.horizon
     found = program.solved(g, low, high, before.start if before else None)
     if found:
-        plan = Plan(found.z[:n], found.z, multipliers=found.multipliers)
+        plan = Plan(found.z[:n], start=Start(found.z, found.multipliers))
         return plan, {"fallback": 0.0, "iterations": float(found.iterations)}
     return (before or steady_plan(n, steady_v)).shifted(), {"fallback": 1.0}
 
 
 def steady_plan(horizon: int, steady_v: float, place_m: float = nan) -> Plan:
     """One opening all along."""
-    held = np.full(horizon, steady_v)
-    return Plan(held, np.append(held, NONE), place_m)
+    return Plan(np.full(horizon, steady_v), place_m)
 
 
 def linear_mpc(

@@ -13,6 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from controllers.axis import Axis
+from controllers.scheduled import Schedule
 from linearize.modes import Mode
 
 PREVIEW = 4  # columns of the reference whose differences are speed, acceleration and jerk
@@ -46,16 +47,23 @@ def motion(coming: np.ndarray, sample_time_s: float, limits: MotionLimits) -> np
 class Sliding:
     """Pressures and opening of a moving axis on one mode, (p_a, p_b, opening).
 
-    level      at zero speed, shape (3,)
-    slopes     per unit of speed, acceleration and jerk, shape (3, 3)
+    per_unit    at zero speed, and per unit of speed, acceleration and jerk, shape (3, 4)
     """
 
-    level: np.ndarray
-    slopes: np.ndarray
+    per_unit: np.ndarray
 
-    def at(self, wanted: np.ndarray) -> np.ndarray:
-        """Those of a motion (speed, acceleration, jerk), shape (3,)."""
-        return self.level + self.slopes @ wanted
+    @property
+    def level(self) -> np.ndarray:
+        """Those at zero speed, shape (3,)."""
+        return self.per_unit[:, 0]
+
+
+def needed(
+    sliding: Schedule[Sliding], place: float, ahead: float, wanted: np.ndarray
+) -> np.ndarray:
+    """Pressures and opening (3,) of a motion (speed, acceleration, jerk), mixed of the modes."""
+    mixed = sum(weight * each.per_unit for weight, each in sliding.weighted(place, ahead))
+    return mixed[:, 0] + mixed[:, 1:] @ wanted
 
 
 def sliding_on(mode: Mode, axis: Axis, centre_v: float) -> Sliding:
@@ -77,4 +85,4 @@ def sliding_on(mode: Mode, axis: Axis, centre_v: float) -> Sliding:
     per_bend = solved(np.array([1.0, *per_speed[:2]]))
     per_jerk = solved(np.array([0.0, *per_bend[:2]]))
     level = centre + solved(-mode.drift[rows]) - per_speed * mode.state[v]
-    return Sliding(level, np.column_stack([per_speed, per_bend, per_jerk]))
+    return Sliding(np.column_stack([level, per_speed, per_bend, per_jerk]))

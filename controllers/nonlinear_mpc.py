@@ -16,8 +16,9 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from controllers.condensed import MpcSpec, Program
+from controllers.condensed import Program
 from controllers.linear_mpc import LinearMpc, Plan, linear_mpc
+from controllers.mpc_spec import MpcSpec
 from controllers.positioning import STATES, Task
 from controllers.rollout import Rollout, sliding_advance
 from linearize.modes import HybridModel
@@ -33,7 +34,7 @@ class NonlinearMpc(LinearMpc):
         self, program: Program, now: Task, force_n: float, before: Plan | None
     ) -> tuple[Program, np.ndarray]:
         shifted = before.shifted().openings if before else np.full(program.horizon, now.opening_v)
-        openings = np.clip(shifted, *program.openings)
+        openings = np.clip(shifted, *program.limits.openings)
         side = 1.0 if now.ahead >= 0.5 else -1.0  # a share of friction would leave the slide stuck
         return along(program, self.rollout, now.x, openings, [side, force_n])
 

@@ -24,7 +24,7 @@ import casadi as ca
 import numpy as np
 
 from controllers.axis import axis_of
-from controllers.motion import PREVIEW, MotionLimits, Sliding, motion, sliding_on
+from controllers.motion import PREVIEW, MotionLimits, Sliding, motion, needed, sliding_on
 from controllers.scheduled import Schedule, scheduled
 from controllers.spec import ranged
 from controllers.through_valve import ThroughValve, through_valve
@@ -82,7 +82,7 @@ class PositioningSpec:
     turn_m_s: float = 0.02
     smooth_v: float = 0.01
 
-    @property
+    @cached_property
     def limits(self) -> MotionLimits:
         """Beyond which the reference has jumped."""
         return MotionLimits(
@@ -149,14 +149,14 @@ class Positioning:
         turn_per_s = spec.turn_per_s if speed_m_s else spec.standing_per_s
         wish = (speed_m_s - turn_per_s * error_m) / spec.turn_m_s
         ahead = 0.5 + 0.5 * tanh(wish)
-        needed = sum(w * each.at(wanted) for w, each in self.sliding.weighted(x[0], ahead))
+        p_a, p_b, opening_v = needed(self.sliding, x[0], ahead, wanted).tolist()
         rise_n = self._stribeck_n(x[1]) * (2.0 * ahead - 1.0)
         rise_pa = rise_n / (2.0 * self.area_m2)
         near = x[0] - min(max(error_m, -spec.approach_m), spec.approach_m)
-        target = np.array([near, speed_m_s, needed[0] + rise_pa, needed[1] - rise_pa])
+        target = np.array([near, speed_m_s, p_a + rise_pa, p_b - rise_pa])
         rests = self._rests(memory, error_m, x[1], speed_m_s)
         rate_m = self._rate_m(error_m, x[1])
-        return Task(x, target, needed[2], error_m, speed_m_s, ahead, rests, rate_m, rise_n)
+        return Task(x, target, opening_v, error_m, speed_m_s, ahead, rests, rate_m, rise_n)
 
     def _rests(self, memory: Memory, error_m: float, v_m_s: float, speed_m_s: float) -> bool:
         spec = self.spec

@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from controllers.condensed import MpcSpec
 from controllers.design_file import design
 from controllers.linear_mpc import limited_plan, linear_mpc
+from controllers.mpc_spec import MpcSpec
 from controllers.nonlinear_mpc import nonlinear_mpc
 from controllers.program_solvers import Osqp
 from linearize.shifting import STATES as SHIFT_STATES

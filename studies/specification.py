@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from controllers import CONTROLLERS
-from controllers.condensed import MpcSpec
+from controllers.mpc_spec import MpcSpec
 from controllers.spec import replaced
 from linearize.axes import stroke_m
 from linearize.standard import POSITION, PRESSURES, SHIFT_MODES, SLIDE_MODES, SUPPLY, VELOCITY

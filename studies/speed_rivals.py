@@ -16,8 +16,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from controllers.condensed import MpcSpec, Program
+from controllers.condensed import Program
 from controllers.linear_mpc import LinearMpc
+from controllers.mpc_spec import MpcSpec
 from controllers.nonlinear_mpc import NonlinearMpc, along
 from controllers.positioning import STATES
 from controllers.rollout import Rollout, advance_of
@@ -44,7 +45,7 @@ def limited(programs: Sequence[Program], number: int, seed: int = 0) -> Iterator
         targets = np.tile([place_m, 0.0, 5e5, 5e5], program.horizon)
         g = program.gradient(unforced, targets, 0.0, 0.0)
         if not program.keeps(program.unlimited(g), unforced, 0.0):
-            yield program, g, *program.bounds(unforced, 0.0)
+            yield program, g, *program.limits.bounds(unforced, 0.0)
 
 
 def exact(program: Program, g: np.ndarray, low: np.ndarray, high: np.ndarray) -> float:
@@ -137,7 +138,7 @@ def by_ipopt(design: NonlinearMpc, calls: int) -> np.ndarray:
 
     def solved(k: int) -> float:
         given = [0.145 + 2e-4 * k, 0.1, 5.9e5, 5.0e5]
-        bounds = {"lbx": program.openings[0], "ubx": program.openings[1]}
+        bounds = {"lbx": program.limits.openings[0], "ubx": program.limits.openings[1]}
         last[0] = solver(x0=last[0], p=given, **bounds)["x"]
         return float(last[0][0])
 

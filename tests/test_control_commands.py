@@ -8,8 +8,9 @@ import pytest
 from commands import call
 from slide_controllers import SLIDE_CONTROLLERS
 
-from controllers.condensed import MpcSpec, limits_of
 from controllers.design_file import read_design
+from controllers.mpc_limits import limits_of
+from controllers.mpc_spec import MpcSpec
 from linearize.axes import stroke_m
 from linearize.standard import SLIDE_MODES
 from studies.checking import Loops, differences

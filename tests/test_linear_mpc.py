@@ -7,9 +7,9 @@ import cvxpy as cp
 import numpy as np
 import pytest
 
-from controllers.condensed import MpcSpec
 from controllers.linear_mpc import limited_plan, linear_mpc
 from controllers.lq import dlqr
+from controllers.mpc_spec import MpcSpec
 from controllers.positioning import STATES
 from controllers.program_solvers import Daqp, Osqp
 from linearize.discrete import sampled
@@ -57,7 +57,7 @@ def oracle(program, spec, x, targets, without=""):
         move = u[i] - (u[i - 1] if i else 0.3)
         cost += cp.sum_squares(root @ (x - targets[:4])) + program.R * cp.square(u[i] - 0.1)
         cost += program.S * cp.square(move)
-        limits += [u[i] >= program.openings[0], u[i] <= program.openings[1]]
+        limits += [u[i] >= program.limits.openings[0], u[i] <= program.limits.openings[1]]
         if without != "rate":
             limits += [cp.abs(move) <= spec.rate_v_s * spec.sample_time_s + slack[4]]
         for k, (name, unit) in enumerate(units.items()):
@@ -88,7 +88,7 @@ def test_each_soft_limit_has_the_solution_of_a_readable_oracle(hybrid, limit, so
     unforced = program.unforced(np.array(x), 0.0)
     g = program.gradient(unforced, targets, 0.1, 0.3)
 
-    plan, notes = limited_plan(program, g, *program.bounds(unforced, 0.3), None, 0.1)
+    plan, notes = limited_plan(program, g, *program.limits.bounds(unforced, 0.3), None, 0.1)
 
     wanted = oracle(program, spec, np.array(x), targets)
     assert notes["fallback"] == 0.0
@@ -104,7 +104,7 @@ def test_openings_keep_the_limits_where_they_keep_the_rows_of_the_program_withou
     steps = rng.normal(0.0, rng.choice([0.02, 0.2], (200, 1)), (200, n))
     for x, step in zip(states, steps, strict=True):
         openings, unforced = 0.1 + np.cumsum(step), program.unforced(x, 0.0)
-        low, high = program.bounds(unforced, 0.1)
+        low, high = program.limits.bounds(unforced, 0.1)
         at = program.rows @ np.concatenate([openings, np.zeros(5)])
         answers.append(program.keeps(openings, unforced, 0.1))
 
@@ -112,7 +112,8 @@ def test_openings_keep_the_limits_where_they_keep_the_rows_of_the_program_withou
     calm = np.zeros(n), program.unforced(REST, 0.0)
     assert 10 < sum(answers) < 190 and program.keeps(*calm, 0.0)
     assert not program.keeps(*calm, 0.5)
-    assert not program.keeps(np.full(n, program.openings[1] + 0.1), calm[1], program.openings[1])
+    largest = program.limits.openings[1]
+    assert not program.keeps(np.full(n, largest + 0.1), calm[1], largest)
     assert not program.keeps(np.full(n, np.nan), calm[1], 0.0)
 
 
@@ -132,7 +133,7 @@ def test_both_solvers_make_the_same_step_at_the_limits_and_repeat_it(hybrid):
         assert np.array_equal(other.value, again.value)
         if other.notes["iterations"] > 0:
             at_limits += 1
-            multipliers = [each.memory.plan.multipliers for each in (one, other)]
+            multipliers = [each.memory.plan.start.multipliers for each in (one, other)]
             assert multipliers[1] == pytest.approx(multipliers[0], abs=1e-3)
     assert at_limits >= 5
 
@@ -141,7 +142,7 @@ def test_a_program_that_osqp_does_not_finish_has_no_answer(hybrid):
     program = linear_mpc(hybrid, MpcSpec(), Osqp(most_iterations=2)).programs.forward[1]
     unforced = program.unforced(FAST, 0.0)
     g = program.gradient(unforced, np.tile([0.2, 0.0, 5.9e5, 5.0e5], 20), 0.1, 0.3)
-    plan, notes = limited_plan(program, g, *program.bounds(unforced, 0.3), None, 0.1)
+    plan, notes = limited_plan(program, g, *program.limits.bounds(unforced, 0.3), None, 0.1)
 
     assert notes == {"fallback": 1.0}
     assert plan.openings == pytest.approx(0.1)
@@ -184,8 +185,8 @@ def test_mpc_replays_a_run_at_its_limits_to_the_last_bit(hybrid, controller):
         for k in order:
             unforced = program.unforced(states[k], 0.0)
             g = program.gradient(unforced, np.tile([0.28, 0.0, 5.9e5, 5.0e5], 20), 0.1, 0.3)
-            plan, notes = limited_plan(program, g, *program.bounds(unforced, 0.3), None, 0.1)
-            found[k] = (plan.primal, plan.openings, notes)
+            plan, notes = limited_plan(program, g, *program.limits.bounds(unforced, 0.3), None, 0.1)
+            found[k] = (plan.start.z, plan.openings, notes)
         return [found[k] for k in range(len(states))]
 
     first = planned(controller.programs.forward[1], range(len(states)))
@@ -193,7 +194,7 @@ def test_mpc_replays_a_run_at_its_limits_to_the_last_bit(hybrid, controller):
     limited_plan(
         program,
         np.full(len(program.hessian), np.nan),
-        *program.bounds(program.unforced(states[0], 0.0), 0.3),
+        *program.limits.bounds(program.unforced(states[0], 0.0), 0.3),
         None,
         0.0,
     )
@@ -206,7 +207,7 @@ def test_mpc_replays_a_run_at_its_limits_to_the_last_bit(hybrid, controller):
 def test_mpc_falls_back_on_its_last_plan(controller):
     program = controller.programs.forward[1]
     before = controller.step(controller.start(), held(controller, 0.16), seen(REST)).memory.plan
-    low, high = program.bounds(program.unforced(REST, 0.0), 0.0)
+    low, high = program.limits.bounds(program.unforced(REST, 0.0), 0.0)
 
     unknown = np.full(len(program.hessian), np.nan)
     plan, notes = limited_plan(program, unknown, low, high, before, 0.0)

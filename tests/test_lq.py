@@ -12,10 +12,10 @@ from controllers.design_file import design
 from controllers.feedback_linearisation import LinearisingSpec, feedback_linearising
 from controllers.lq import lq_gain, with_integral
 from controllers.margins import closed, integral_of, margins_of
-from controllers.motion import MotionLimits, motion, sliding_on
+from controllers.motion import MotionLimits, motion, needed, sliding_on
 from controllers.output_feedback import kalman_gain, lqg_law
 from controllers.regulator import RegulatorSpec, regulator
-from controllers.scheduled import driven_modes
+from controllers.scheduled import constant, driven_modes
 from linearize.discrete import sampled
 from linearize.standard import axis_modes, standard_modes
 from studies.closed_loop_check import run, standard_estimator
@@ -94,8 +94,8 @@ def test_pressures_and_opening_of_a_motion_are_those_under_which_the_mode_moves_
 
     def at(time_s):
         wanted = np.array([0.1 + 0.4 * time_s + 3.0 * time_s**2, 0.4 + 6.0 * time_s, 6.0])
-        needed = found.at(wanted)
-        return np.array([place, wanted[0], *needed[:2]]), needed[2:], wanted
+        with_it = needed(constant(found), place, 1.0, wanted)
+        return np.array([place, wanted[0], *with_it[:2]]), with_it[2:], wanted
 
     x, u, wanted = at(0.01)
     rates = mode.rates(x, u)

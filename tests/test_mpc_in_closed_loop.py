@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from controllers.condensed import MpcSpec
 from controllers.linear_mpc import linear_mpc
+from controllers.mpc_spec import MpcSpec
 from controllers.nonlinear_mpc import nonlinear_mpc
 from controllers.program_solvers import Daqp
 from linearize.standard import PRESSURES, standard_modes

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from controllers.condensed import MpcSpec
 from controllers.linear_mpc import limited_plan, linear_mpc
+from controllers.mpc_spec import MpcSpec
 from controllers.nonlinear_mpc import NonlinearMpc, along, nonlinear_mpc
 from controllers.positioning import STATES
 from controllers.rollout import Rollout
@@ -118,13 +118,17 @@ def test_repeated_at_one_state_it_comes_to_the_optimum_of_the_nonlinear_problem(
     cost += program.R * ca.sumsqr(u - 0.1) + program.S * ca.sumsqr(moves)
     quiet = {"ipopt.print_level": 0, "print_time": False, "ipopt.tol": 1e-10}
     solver = ca.nlpsol("exact", "ipopt", {"x": u, "f": cost}, quiet)
-    wanted = solver(x0=0.1, lbx=program.openings[0], ubx=program.openings[1])["x"].full().ravel()
+    wanted = (
+        solver(x0=0.1, lbx=program.limits.openings[0], ubx=program.limits.openings[1])["x"]
+        .full()
+        .ravel()
+    )
 
     openings, changes = np.full(n, 0.1), []
     for _ in range(8):
         near, unforced = along(program, controller.rollout, SLIDING, openings, d)
         g = near.gradient(unforced, targets, 0.1, 0.3)
-        plan, notes = limited_plan(near, g, *near.bounds(unforced, 0.3), None, 0.1)
+        plan, notes = limited_plan(near, g, *near.limits.bounds(unforced, 0.3), None, 0.1)
         assert notes["fallback"] == 0.0
         changes.append(abs(plan.openings - wanted).max())
         openings = plan.openings
@@ -180,4 +184,4 @@ def test_it_gives_the_same_answer_twice_and_unpickled(controller):
 
     assert found[0].notes["iterations"] > 0
     for one in found[1:]:
-        assert np.array_equal(one.memory.plan.primal, found[0].memory.plan.primal)
+        assert np.array_equal(one.memory.plan.openings, found[0].memory.plan.openings)

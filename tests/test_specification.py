@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from controllers.condensed import MpcSpec
+from controllers.mpc_spec import MpcSpec
 from linearize.axes import stroke_m
 from studies.checking import drawn_plant
 from studies.scenarios import SCENARIOS

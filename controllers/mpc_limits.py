@@ -1,0 +1,98 @@
+"""What the openings of linear and nonlinear MPC must keep, and how a program reads it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from controllers.mpc_spec import MpcSpec
+from controllers.positioning import STATES
+from linearize.axes import stroke_m
+from linearize.standard import SUPPLY
+from workbench.errors import InputError, Message, listed
+from workbench.plant import Plant
+
+SLACK_UNIT = np.array([1e-3, 0.1, 1e4, 1e4])  # m, m/s, Pa, Pa: violations that cost alike
+SLACKS = len(STATES) + 1  # one per state, and one for the rate of the opening, in V per sample
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Of N openings hard, of their changes and of the stacked states softly.
+
+    states      lower and upper over the horizon, shape (2, 4 N)
+    openings    smallest and largest opening
+    move_v      largest change of the opening from sample to sample
+    """
+
+    states: np.ndarray
+    openings: tuple[float, float]
+    move_v: float
+
+    @property
+    def horizon(self) -> int:
+        return self.states.shape[1] // len(STATES)
+
+    @cached_property
+    def within(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lowest and highest openings, moves and stacked states, shapes (6 N,)."""
+        moved = -self.move_v, self.move_v
+        sides = zip(self.openings, moved, self.states, strict=True)
+        low, high = (np.concatenate([*np.tile([[u], [m]], self.horizon), x]) for u, m, x in sides)
+        return low, high
+
+    def bounds(self, unforced: np.ndarray, last_v: float) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper side of the rows of a program: openings, what is soft twice, slacks.
+
+        For stacked states (4 N,) under zero openings, and the last opening.
+        """
+        n, (lower, upper) = self.horizon, (side.copy() for side in self.sides)
+        at = (unforced.reshape(n, -1) / SLACK_UNIT).ravel()
+        soft = len(at) + n
+        lower[n : n + len(at)] -= at
+        upper[n + soft : n + soft + len(at)] -= at
+        lower[n + len(at)] += last_v
+        upper[n + soft + len(at)] += last_v
+        return lower, upper
+
+    @cached_property
+    def sides(self) -> tuple[np.ndarray, np.ndarray]:
+        """What :meth:`bounds` gives for states and a last opening of zero."""
+        n = self.horizon
+        low, high = self.states / np.tile(SLACK_UNIT, n)
+        moved, slack = np.full(n, self.move_v), np.zeros(SLACKS)
+        none = np.full(len(low) + n, np.inf)
+        first, last = (np.full(n, side) for side in self.openings)
+        lower = [first, low, -moved, -none, slack]
+        upper = [last, none, high, moved, slack + np.inf]
+        return np.concatenate(lower), np.concatenate(upper)
+
+
+def soft_rows(N: int) -> tuple[slice, slice]:
+    """Rows of what is soft below and above: the states of all samples, then the N moves."""
+    below, above, end = (N * (1 + side * SLACKS) for side in range(3))
+    return slice(below, above), slice(above, end)
+
+
+def limits_of(plant: Plant, spec: MpcSpec, method: str = "mpc") -> np.ndarray:
+    """Lowest and highest position, velocity and pressures, shape (2, 4).
+
+    ``method`` is the controller whose numbers they are.
+
+    Raises
+    ------
+    InputError
+        If nothing is left between them.
+    """
+    highest_pa = float(plant.values[SUPPLY]) - spec.below_supply_pa
+    lowest_m, below_m = (max(spec.margin_m, each) for each in (spec.lowest_m, spec.below_end_m))
+    low = [lowest_m, -spec.fastest_m_s, spec.lowest_pa, spec.lowest_pa]
+    high = [stroke_m(plant) - below_m, spec.fastest_m_s, highest_pa, highest_pa]
+    if not np.less(low, high).all():
+        names = "margin_m", "lowest_pa", "below_supply_pa", "lowest_m", "below_end_m"
+        what = listed([f"{name} {getattr(spec, name):g}" for name in names])
+        expected = "less than the stroke and the supply pressure between them"
+        raise InputError(Message(f"{what} leave no room on {plant.name}", method, expected))
+    return np.array([low, high])
