@@ -2,8 +2,9 @@
 
 Designs side by side at the plant's own supply; hybrid MPC with the same numbers at 7 to 10 bar; and
 hybrid MPC on plants drawn from their uncertainty: as delivered, where design and filter know
-nothing of the draw; after commissioning, by a fit to one recording of the drawn plant; known; and
-known by a search that judges fewer plans at a sample, for a computer that has no time for all.
+nothing of the draw; where they know its two valves alone; after commissioning, by a fit to one
+recording of the drawn plant; known; and known by a search that judges fewer plans at a sample, for
+a computer that has no time for all.
 
 Source: paper 003 and its follow-up, Appl. Sci. 2020, 10(10), 3514, which ranks scheduled designs
 above LQ and LQ above PD; physics.md 7, case 4.
@@ -38,6 +39,8 @@ SUPPLIES_PA = (7e5, 8e5, 9e5, 10e5)
 DRAWS = {Extent.QUICK: 3, Extent.FULL: 30}
 FIRST_SEED = 1  # of the draws
 SUPPLY = "supply.pressure_pa"
+KNOWN = ("shifts", "valves", "after", "known", "fewer")  # rows of a draw, by what is known of it
+VALVES = ("valve_1.", "valve_2.")
 HYBRID, PD, LQ, SCHEDULED = "hybrid MPC", "PD", "LQ", "scheduled LQ"
 
 
@@ -51,8 +54,13 @@ def run(folder: Path, extent: Extent, say: Callable[[str], None]) -> Outcome:
         plant = gearbox().with_values({SUPPLY: supply_pa})
         supplies[supply_pa] = check_shifts(plant, {HYBRID: hybrid(plant)}, SHIFTS).rows
     found = _drawn_rows(Kept(work_folder(folder) / "rows.jsonl"), DRAWS[extent], say)
-    rows, after, known, fewer = (found[key] for key in ("shifts", "after", "known", "fewer"))
-    by_knowledge = {"as delivered": _of(rows, HYBRID), "after": after, "known": known}
+    rows, valves, after, known, fewer = (found[key] for key in KNOWN)
+    by_knowledge = {
+        "as delivered": _of(rows, HYBRID),
+        "valves known": valves,
+        "after": after,
+        "known": known,
+    }
     text = "\n\n".join(
         [
             shift_table(beside.rows),
@@ -69,6 +77,7 @@ def run(folder: Path, extent: Extent, say: Callable[[str], None]) -> Outcome:
         "beside": [vars(row) for row in beside.rows],
         "supplies": {f"{1e-5 * p:g} bar": [vars(r) for r in f] for p, f in supplies.items()},
         "draws": {name: _reached(rows, name) for name in SHIFTS},
+        "valves known": {name: _reached(valves, name) for name in SHIFTS},
         "after commissioning": {name: _reached(after, name) for name in SHIFTS},
         "known": {name: _reached(known, name) for name in SHIFTS},
         "known, fewer judged": {name: _reached(fewer, name) for name in SHIFTS},
@@ -105,27 +114,31 @@ def _drawn_rows(kept: Kept, number: int, say: Callable[[str], None]) -> dict[str
     found = chosen_workers().keep(
         kept, _draw, pieces, lambda done, of: say(f"{done} of {of} drawn plants")
     )
-    keys = ("shifts", "after", "known", "fewer")
-    return {key: [Shift(**row) for each in found for row in each[key]] for key in keys}
+    return {key: [Shift(**row) for each in found for row in each[key]] for key in KNOWN}
 
 
 def _draw(number: int) -> Row:
     """All four shifts on the plant of a draw, by what is known of it.
 
-    Nothing, by every design; what one recording shows, and all, by hybrid MPC, and by one that
-    judges fewer plans.
+    Nothing, by every design; the valves, what one recording shows, and all, by hybrid MPC, and by
+    one that judges fewer plans.
     """
     plant, own = gearbox(), f"{HYBRID} {number + 1}"
     truth = _truth(number)
+
+    def known_as(believed: Plant) -> tuple[Shift, ...]:
+        made = {own: hybrid(believed)}
+        return check_shifts(truth, made, SHIFTS, believed=believed, seed=number).rows
+
     made = {f"{name} {number + 1}": found for name, found in _compared().items()}
     rows = check_shifts(truth, made, SHIFTS, believed=plant, seed=number).rows
-    fitted = commissioned(truth, number).rig.plant
-    after = check_shifts(truth, {own: hybrid(fitted)}, SHIFTS, believed=fitted, seed=number).rows
-    known = check_shifts(truth, {own: hybrid(truth)}, SHIFTS, seed=number).rows
+    alone = {name: value for name, value in truth.values.items() if name.startswith(VALVES)}
+    valves = known_as(plant.with_values(alone))
+    after, known = known_as(commissioned(truth, number).rig.plant), known_as(truth)
     quick = design("hybrid-mpc", truth, {"judged": FEWER}).controller
     fewer = check_shifts(truth, {own: quick}, SHIFTS, seed=number).rows
-    groups = {"shifts": rows, "after": after, "known": known, "fewer": fewer}
-    return {key: [vars(row) for row in found] for key, found in groups.items()}
+    groups = zip(KNOWN, (rows, valves, after, known, fewer), strict=True)
+    return {key: [vars(row) for row in found] for key, found in groups}
 
 
 def _truth(number: int) -> Plant:
