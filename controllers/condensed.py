@@ -88,7 +88,9 @@ class Program:
 
     def unforced(self, x: np.ndarray, force_n: float) -> np.ndarray:
         """Stacked states under zero openings, shape (4 N,)."""
-        return self.reply @ np.array([*x, force_n, 1.0])
+        causes = np.ones(len(x) + 2)
+        causes[: len(x)], causes[-2] = x, force_n
+        return self.reply @ causes
 
     @cached_property
     def reply(self) -> np.ndarray:

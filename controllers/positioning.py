@@ -18,7 +18,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from math import tanh
-from typing import Any
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -99,8 +99,7 @@ class Memory:
     plan: Any = None
 
 
-@dataclass(frozen=True)
-class Task:
+class Task(NamedTuple):
     """One sample of the positioning task.
 
     x             position, velocity and pressures, shape (4,)
