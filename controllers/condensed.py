@@ -35,7 +35,7 @@ class Program:
     drift, pushed       shapes (4 N,)
     Q                   cost of the stacked states, shape (4 N, 4 N)
     R, S                cost of an opening and of its change
-    limits              what they must keep
+    limits              what openings and states must keep
     slack_weight        cost of a violation that grows as its square
     slack_price         cost of a violation that grows in proportion
     solver              what solves it at its limits
@@ -122,10 +122,11 @@ class Program:
         """Whether openings, shape (N,), keep all limits; not finite, they do not."""
         n, (low, high) = self.horizon, self.limits.within
         at = np.empty(len(low))
-        at[:n], at[n] = openings, openings[0] - last_v
-        np.subtract(openings[1:], openings[:-1], out=at[n + 1 : 2 * n])
-        np.matmul(self.forced, openings, out=at[2 * n :])
-        at[2 * n :] += unforced
+        at[:n], moves = openings, at[-n:]
+        np.matmul(self.forced, openings, out=at[n:-n])
+        at[n:-n] += unforced
+        moves[0] = openings[0] - last_v
+        np.subtract(openings[1:], openings[:-1], out=moves[1:])
         return bool(((at >= low) & (at <= high)).all())
 
     @cached_property
@@ -166,7 +167,8 @@ class Program:
 
     def prepared(self) -> Program:
         """The same program with its factors at hand, so that the first sample need not wait."""
-        _ = self.general, self.inverse, self.reply, self.limits.sides, self.limits.within
+        _ = self.general, self.inverse, self.reply, self.priced
+        _ = self.limits.sides, self.limits.within
         return self
 
 
@@ -178,7 +180,7 @@ def program_of(
     limits: np.ndarray,
     openings: tuple[float, float],
 ) -> Program:
-    """The condensed program of a mode; ``limits`` are those of one state, shape (2, 4)."""
+    """The condensed program of a mode; ``limits`` of the states of a sample, shape (2, 4)."""
     small, N = sampled(mode, spec.sample_time_s), spec.horizon
     tolerable = np.array([spec.position_m, spec.velocity_m_s, spec.pressure_pa, spec.pressure_pa])
     Q, R, S = np.diag(tolerable**-2.0), spec.opening_v**-2.0, spec.move_v**-2.0

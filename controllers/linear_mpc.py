@@ -37,7 +37,7 @@ import numpy as np
 from controllers.condensed import BALANCING, Program, program_of
 from controllers.margins import Law
 from controllers.motion import PREVIEW
-from controllers.mpc_limits import limits_of, soft_rows
+from controllers.mpc_limits import soft_rows, state_limits
 from controllers.mpc_spec import MpcSpec
 from controllers.positioning import STATES, Memory, Positioning, Task, positioning
 from controllers.program_solvers import Daqp, Solver, Start
@@ -48,6 +48,7 @@ from linearize.reduction import closed_command
 from workbench.contracts import Command, Estimate
 
 PUSHED = np.array([0.0, 1.0, 1.0, -1.0])  # ways of velocity and pressures as the slide is pushed
+AT_END_V = 1e-9  # from an end of the valve, which a solver meets to rounding
 ROUNDED = 1e-3  # cost per unit of a slack: multipliers below are rounding of a solver
 
 
@@ -135,7 +136,8 @@ class LinearMpc:
             plan, notes = (memory.plan or steady).shifted(), {"fallback": 1.0}
         smallest_v, largest_v = valve.openings_v
         opening = min(max(float(plan.openings[0]), smallest_v), largest_v)
-        if opening in valve.openings_v or plan.against(-now.rate_m):
+        room_v = min(opening - smallest_v, largest_v - opening)
+        if room_v < AT_END_V or plan.against(-now.rate_m):
             integral = memory.integral_m_s
         notes = {"resting": 0.0, "opening_v": opening, "integral_m_s": integral, **notes}
         notes["late"] = float(late)
@@ -171,7 +173,7 @@ class LinearMpc:
 
     def _targets(self, now: Task, reference: np.ndarray, n: int, friction_n: float) -> np.ndarray:
         """Stacked targets, shape (4 N,): the coming reference as far off as the approach allows."""
-        targets = np.empty((n, len(now.target)))
+        targets = np.empty((n, len(now.target)))  # of one that stands now.target has the place
         targets[:] = now.target + friction_n / self.task.area_m2 * BALANCING
         if now.speed_m_s:
             limit = self.task.spec.approach_m
@@ -215,7 +217,7 @@ def linear_mpc(
     spec = spec or MpcSpec()
     task = positioning(hybrid, spec.positioning)
     centre_v = closed_command(hybrid.plant)
-    limits = limits_of(hybrid.plant, spec, method)
+    limits = state_limits(hybrid.plant, spec, method)
     sizes = centre_v, task.area_m2, limits, task.valve.openings_v
     by = solver or Daqp()
     programs = scheduled(

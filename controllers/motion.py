@@ -47,22 +47,22 @@ def motion(coming: np.ndarray, sample_time_s: float, limits: MotionLimits) -> np
 class Sliding:
     """Pressures and opening of a moving axis on one mode, (p_a, p_b, opening).
 
-    per_unit    at zero speed, and per unit of speed, acceleration and jerk, shape (3, 4)
+    by_motion   columns of 1, speed, acceleration and jerk, shape (3, 4)
     """
 
-    per_unit: np.ndarray
+    by_motion: np.ndarray
 
     @property
     def level(self) -> np.ndarray:
         """Those at zero speed, shape (3,)."""
-        return self.per_unit[:, 0]
+        return self.by_motion[:, 0]
 
 
-def needed(
+def going_with(
     sliding: Schedule[Sliding], place: float, ahead: float, wanted: np.ndarray
 ) -> np.ndarray:
     """Pressures and opening (3,) of a motion (speed, acceleration, jerk), mixed of the modes."""
-    mixed = sum(weight * each.per_unit for weight, each in sliding.weighted(place, ahead))
+    mixed = sum(weight * each.by_motion for weight, each in sliding.weighted(place, ahead))
     return mixed[:, 0] + mixed[:, 1:] @ wanted
 
 

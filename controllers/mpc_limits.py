@@ -37,11 +37,11 @@ class Limits:
 
     @cached_property
     def within(self) -> tuple[np.ndarray, np.ndarray]:
-        """Lowest and highest openings, moves and stacked states, shapes (6 N,)."""
-        moved = -self.move_v, self.move_v
-        sides = zip(self.openings, moved, self.states, strict=True)
-        low, high = (np.concatenate([*np.tile([[u], [m]], self.horizon), x]) for u, m, x in sides)
-        return low, high
+        """Lowest and highest openings, stacked states and moves, shapes (6 N,)."""
+        n, (low, high) = self.horizon, self.states
+        first, last = (np.full(n, side) for side in self.openings)
+        moved = np.full(n, self.move_v)
+        return np.concatenate([first, low, -moved]), np.concatenate([last, high, moved])
 
     def bounds(self, unforced: np.ndarray, last_v: float) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper side of the rows of a program: openings, what is soft twice, slacks.
@@ -76,7 +76,7 @@ def soft_rows(N: int) -> tuple[slice, slice]:
     return slice(below, above), slice(above, end)
 
 
-def limits_of(plant: Plant, spec: MpcSpec, method: str = "mpc") -> np.ndarray:
+def state_limits(plant: Plant, spec: MpcSpec, method: str = "mpc") -> np.ndarray:
     """Lowest and highest position, velocity and pressures, shape (2, 4).
 
     ``method`` is the controller whose numbers they are.

@@ -24,7 +24,7 @@ import casadi as ca
 import numpy as np
 
 from controllers.axis import axis_of
-from controllers.motion import PREVIEW, MotionLimits, Sliding, motion, needed, sliding_on
+from controllers.motion import PREVIEW, MotionLimits, Sliding, going_with, motion, sliding_on
 from controllers.scheduled import Schedule, scheduled
 from controllers.spec import ranged
 from controllers.through_valve import ThroughValve, through_valve
@@ -148,7 +148,7 @@ class Positioning:
         turn_per_s = spec.turn_per_s if speed_m_s else spec.standing_per_s
         wish = (speed_m_s - turn_per_s * error_m) / spec.turn_m_s
         ahead = 0.5 + 0.5 * tanh(wish)
-        p_a, p_b, opening_v = needed(self.sliding, x[0], ahead, wanted).tolist()
+        p_a, p_b, opening_v = going_with(self.sliding, x[0], ahead, wanted).tolist()
         rise_n = self._stribeck_n(x[1]) * (2.0 * ahead - 1.0)
         rise_pa = rise_n / (2.0 * self.area_m2)
         near = x[0] - min(max(error_m, -spec.approach_m), spec.approach_m)

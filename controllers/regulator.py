@@ -16,7 +16,7 @@ import numpy as np
 from controllers.axis import Axis, axis_of
 from controllers.lq import Gain, lq_gain
 from controllers.margins import Law, integral_of
-from controllers.motion import PREVIEW, MotionLimits, Sliding, motion, needed, sliding_on
+from controllers.motion import PREVIEW, MotionLimits, Sliding, going_with, motion, sliding_on
 from controllers.ranges import InRanges, ranges_of
 from controllers.scheduled import Schedule, scheduled
 from controllers.spec import ranged
@@ -82,11 +82,11 @@ class Regulator:
         wanted = motion(reference[0, :PREVIEW], spec.sample_time_s, spec.limits)
         error = float(x[0] - reference[0, 0])
         ahead = 0.5 + 0.5 * np.tanh((wanted[0] - spec.turn_per_s * error) / spec.turn_speed)
-        with_it = needed(self.sliding, x[0], ahead, wanted)
-        target = np.array([reference[0, 0], wanted[0], *with_it[:2]])
+        p_a, p_b, moving_v = going_with(self.sliding, x[0], ahead, wanted).tolist()
+        target = np.array([reference[0, 0], wanted[0], p_a, p_b])
         integral = last.memory + spec.sample_time_s * error
         here = [*self.gains.weighted(x[0], ahead)]
-        opening_v = with_it[2] - sum(
+        opening_v = moving_v - sum(
             w * (gain.feedback @ (x - target) + gain.integral * integral) for w, gain in here
         )
         limited_v = float(np.clip(opening_v, *self.valve.openings_v))

@@ -39,7 +39,6 @@ SUPPLIES_PA = (7e5, 8e5, 9e5, 10e5)
 DRAWS = {Extent.QUICK: 3, Extent.FULL: 30}
 FIRST_SEED = 1  # of the draws
 SUPPLY = "supply.pressure_pa"
-KNOWN = ("shifts", "valves", "after", "known", "fewer")  # rows of a draw, by what is known of it
 VALVES = ("valve_1.", "valve_2.")
 HYBRID, PD, LQ, SCHEDULED = "hybrid MPC", "PD", "LQ", "scheduled LQ"
 
@@ -54,10 +53,10 @@ def run(folder: Path, extent: Extent, say: Callable[[str], None]) -> Outcome:
         plant = gearbox().with_values({SUPPLY: supply_pa})
         supplies[supply_pa] = check_shifts(plant, {HYBRID: hybrid(plant)}, SHIFTS).rows
     found = _drawn_rows(Kept(work_folder(folder) / "rows.jsonl"), DRAWS[extent], say)
-    rows, valves, after, known, fewer = (found[key] for key in KNOWN)
+    rows, after, known, fewer = (found[key] for key in ("shifts", "after", "known", "fewer"))
     by_knowledge = {
         "as delivered": _of(rows, HYBRID),
-        "valves known": valves,
+        "valves known": found["valves"],
         "after": after,
         "known": known,
     }
@@ -77,7 +76,7 @@ def run(folder: Path, extent: Extent, say: Callable[[str], None]) -> Outcome:
         "beside": [vars(row) for row in beside.rows],
         "supplies": {f"{1e-5 * p:g} bar": [vars(r) for r in f] for p, f in supplies.items()},
         "draws": {name: _reached(rows, name) for name in SHIFTS},
-        "valves known": {name: _reached(valves, name) for name in SHIFTS},
+        "valves known": {name: _reached(found["valves"], name) for name in SHIFTS},
         "after commissioning": {name: _reached(after, name) for name in SHIFTS},
         "known": {name: _reached(known, name) for name in SHIFTS},
         "known, fewer judged": {name: _reached(fewer, name) for name in SHIFTS},
@@ -114,7 +113,8 @@ def _drawn_rows(kept: Kept, number: int, say: Callable[[str], None]) -> dict[str
     found = chosen_workers().keep(
         kept, _draw, pieces, lambda done, of: say(f"{done} of {of} drawn plants")
     )
-    return {key: [Shift(**row) for each in found for row in each[key]] for key in KNOWN}
+    keys = ("shifts", "valves", "after", "known", "fewer")
+    return {key: [Shift(**row) for each in found for row in each[key]] for key in keys}
 
 
 def _draw(number: int) -> Row:
@@ -132,13 +132,21 @@ def _draw(number: int) -> Row:
 
     made = {f"{name} {number + 1}": found for name, found in _compared().items()}
     rows = check_shifts(truth, made, SHIFTS, believed=plant, seed=number).rows
-    alone = {name: value for name, value in truth.values.items() if name.startswith(VALVES)}
-    valves = known_as(plant.with_values(alone))
-    after, known = known_as(commissioned(truth, number).rig.plant), known_as(truth)
     quick = design("hybrid-mpc", truth, {"judged": FEWER}).controller
-    fewer = check_shifts(truth, {own: quick}, SHIFTS, seed=number).rows
-    groups = zip(KNOWN, (rows, valves, after, known, fewer), strict=True)
-    return {key: [vars(row) for row in found] for key, found in groups}
+    groups = {
+        "shifts": rows,
+        "valves": known_as(valves_alone(truth)),
+        "after": known_as(commissioned(truth, number).rig.plant),
+        "known": known_as(truth),
+        "fewer": check_shifts(truth, {own: quick}, SHIFTS, seed=number).rows,
+    }
+    return {key: [vars(row) for row in found] for key, found in groups.items()}
+
+
+def valves_alone(truth: Plant) -> Plant:
+    """The nominal gearbox with the valves of another one."""
+    own = {name: value for name, value in truth.values.items() if name.startswith(VALVES)}
+    return gearbox().with_values(own)
 
 
 def _truth(number: int) -> Plant:

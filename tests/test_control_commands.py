@@ -9,7 +9,7 @@ from commands import call
 from slide_controllers import SLIDE_CONTROLLERS
 
 from controllers.design_file import read_design
-from controllers.mpc_limits import limits_of
+from controllers.mpc_limits import state_limits
 from controllers.mpc_spec import MpcSpec
 from linearize.axes import stroke_m
 from linearize.standard import SLIDE_MODES
@@ -200,13 +200,13 @@ def test_a_check_warns_once_of_a_design_for_other_values(place, monkeypatch, tmp
 def test_limits_of_the_pressures_follow_the_supply():
     low = PLANT.with_values({"supply.pressure_pa": 5e5})
 
-    assert limits_of(PLANT, MpcSpec())[1].tolist() == [stroke_m(PLANT) - 2e-3, 2.0, 6.9e5, 6.9e5]
-    assert limits_of(low, MpcSpec())[1, 2:].tolist() == [4.9e5, 4.9e5]
+    assert state_limits(PLANT, MpcSpec())[1].tolist() == [stroke_m(PLANT) - 2e-3, 2.0, 6.9e5, 6.9e5]
+    assert state_limits(low, MpcSpec())[1, 2:].tolist() == [4.9e5, 4.9e5]
 
 
 def test_each_end_of_the_position_has_its_own_limit_outside_the_margin():
-    both = limits_of(PLANT, MpcSpec(lowest_m=0.05, below_end_m=0.1))[:, 0]
-    none = limits_of(PLANT, MpcSpec(margin_m=0.06, lowest_m=0.05))[:, 0]
+    both = state_limits(PLANT, MpcSpec(lowest_m=0.05, below_end_m=0.1))[:, 0]
+    none = state_limits(PLANT, MpcSpec(margin_m=0.06, lowest_m=0.05))[:, 0]
 
     assert both.tolist() == [0.05, stroke_m(PLANT) - 0.1]
     assert none.tolist() == [0.06, stroke_m(PLANT) - 0.06]

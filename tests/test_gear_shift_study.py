@@ -12,10 +12,13 @@ from studies.gear_shift_study import (
     SCHEDULED,
     _claims_of_draws,
     _missed,
+    _truth,
     ranking,
     told_known,
+    valves_alone,
 )
 from studies.shift_check import SHIFTS, Shift
+from workbench.plants.gearbox import gearbox
 
 TIMES_S = {HYBRID: 0.02, SCHEDULED: 0.03, LQ: 0.035, PD: 0.05}
 
@@ -36,6 +39,16 @@ def rows(number=2, **other):
         for scenario in SHIFTS
         for design, time_s in times.items()
     ]
+
+
+def test_a_plant_of_which_the_valves_alone_are_known_is_nominal_but_for_them():
+    truth, found, nominal = _truth(3).values, valves_alone(_truth(3)).values, gearbox().values
+    own = {name for name in found if name.startswith(("valve_1.", "valve_2."))}
+
+    assert all(found[name] == truth[name] for name in own)
+    assert all(found[name] == nominal[name] for name in set(found) - own)
+    assert sum(truth[name] != nominal[name] for name in own) > 10
+    assert sum(truth[name] != nominal[name] for name in set(found) - own) > 10
 
 
 def test_claims_can_be_written_as_json():

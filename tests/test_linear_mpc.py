@@ -11,7 +11,7 @@ from controllers.linear_mpc import limited_plan, linear_mpc
 from controllers.lq import dlqr
 from controllers.mpc_spec import MpcSpec
 from controllers.positioning import STATES
-from controllers.program_solvers import Daqp, Osqp
+from controllers.program_solvers import Answer, Daqp, Osqp
 from linearize.discrete import sampled
 from linearize.standard import standard_modes
 from workbench.contracts import Estimate
@@ -96,9 +96,13 @@ def test_each_soft_limit_has_the_solution_of_a_readable_oracle(hybrid, limit, so
     assert np.abs(oracle(program, spec, np.array(x), targets, limit) - wanted).max() > 0.01
 
 
-def test_openings_keep_the_limits_where_they_keep_the_rows_of_the_program_without_slack(hybrid):
+@pytest.mark.parametrize("horizon", [1, 20])
+def test_openings_keep_the_limits_where_they_keep_the_rows_of_the_program_without_slack(
+    hybrid, horizon
+):
     """Each kind of limit broken by itself, and random openings around all of them."""
-    program = linear_mpc(hybrid, MpcSpec(rate_v_s=200.0)).programs.forward[1]
+    spec = MpcSpec(rate_v_s=200.0, horizon=horizon)
+    program = linear_mpc(hybrid, spec).programs.forward[1]
     n, rng, answers = program.horizon, np.random.default_rng(7), []
     states = REST + [0.1, 1.5, 1.3e5, 1.3e5] * rng.uniform(-1.0, 1.0, (200, 4))
     steps = rng.normal(0.0, rng.choice([0.02, 0.2], (200, 1)), (200, n))
@@ -110,11 +114,38 @@ def test_openings_keep_the_limits_where_they_keep_the_rows_of_the_program_withou
 
         assert answers[-1] == bool((at >= low).all() and (at <= high).all())
     calm = np.zeros(n), program.unforced(REST, 0.0)
-    assert 10 < sum(answers) < 190 and program.keeps(*calm, 0.0)
+    assert 10 < sum(answers) < 195 and program.keeps(*calm, 0.0)
     assert not program.keeps(*calm, 0.5)
     largest = program.limits.openings[1]
     assert not program.keeps(np.full(n, largest + 0.1), calm[1], largest)
     assert not program.keeps(np.full(n, np.nan), calm[1], 0.0)
+
+
+class NextToTheEnd:
+    """A solver that opens the valve as far as it goes, but for rounding."""
+
+    def solved(self, program, g, low, high, start):
+        z = np.zeros(len(g))
+        z[0] = np.nextafter(program.limits.openings[1], 0.0)
+        return Answer(z, 1, np.zeros(len(low)))
+
+
+def test_the_integral_rests_where_rounding_alone_keeps_the_valve_from_its_end(hybrid):
+    """It grows where the same solver opens the valve less far."""
+
+    class HalfWay(NextToTheEnd):
+        def solved(self, program, g, low, high, start):
+            answer = super().solved(program, g, low, high, start)
+            return answer._replace(z=0.5 * answer.z)
+
+    grown = []
+    for solver in (NextToTheEnd(), HalfWay()):
+        made = linear_mpc(hybrid, MpcSpec(), solver)
+        command = made.step(made.start(), held(made, 0.27), seen([0.145, 0.0, 6.95e5, 1.1e5]))
+        assert command.notes["iterations"] == 1.0
+        grown.append(command.memory.integral_m_s)
+
+    assert grown[0] == 0.0 and abs(grown[1]) > 0.0
 
 
 def test_both_solvers_make_the_same_step_at_the_limits_and_repeat_it(hybrid):

@@ -12,10 +12,10 @@ from controllers.design_file import design
 from controllers.feedback_linearisation import LinearisingSpec, feedback_linearising
 from controllers.lq import lq_gain, with_integral
 from controllers.margins import closed, integral_of, margins_of
-from controllers.motion import MotionLimits, motion, needed, sliding_on
+from controllers.motion import MotionLimits, going_with, motion, sliding_on
 from controllers.output_feedback import kalman_gain, lqg_law
 from controllers.regulator import RegulatorSpec, regulator
-from controllers.scheduled import constant, driven_modes
+from controllers.scheduled import constant, driven_modes, scheduled
 from linearize.discrete import sampled
 from linearize.standard import axis_modes, standard_modes
 from studies.closed_loop_check import run, standard_estimator
@@ -84,6 +84,22 @@ def test_the_motion_of_a_reference_is_its_differences_and_nothing_where_it_jumps
     assert motion(np.array([0.0, 0.0, 1e-3, 2e-3]), DT, limits)[1] == 0.0
 
 
+@pytest.mark.parametrize("ahead", [0.0, 0.3, 1.0])
+def test_between_modes_and_directions_what_goes_with_a_motion_is_mixed(rig, ahead):
+    from controllers.axis import axis_of
+
+    sliding = scheduled(rig, lambda mode: sliding_on(mode, axis_of(rig.plant), 0.0))
+    wanted, (left_m, right_m) = np.array([0.1, 2.0, 50.0]), sliding.positions_m[:2]
+    place_m = left_m + 0.25 * (right_m - left_m)
+    parts = [
+        share * side * going_with(constant(designs[k]), place_m, 1.0, wanted)
+        for side, designs in ((ahead, sliding.forward), (1.0 - ahead, sliding.backward))
+        for k, share in enumerate((0.75, 0.25))
+    ]
+
+    assert going_with(sliding, place_m, ahead, wanted) == pytest.approx(np.sum(parts, axis=0))
+
+
 def test_pressures_and_opening_of_a_motion_are_those_under_which_the_mode_moves_so(rig):
     """Put back into the affine mode they give the wanted acceleration, at every time."""
     from controllers.axis import axis_of
@@ -94,7 +110,7 @@ def test_pressures_and_opening_of_a_motion_are_those_under_which_the_mode_moves_
 
     def at(time_s):
         wanted = np.array([0.1 + 0.4 * time_s + 3.0 * time_s**2, 0.4 + 6.0 * time_s, 6.0])
-        with_it = needed(constant(found), place, 1.0, wanted)
+        with_it = going_with(constant(found), place, 1.0, wanted)
         return np.array([place, wanted[0], *with_it[:2]]), with_it[2:], wanted
 
     x, u, wanted = at(0.01)
