@@ -173,9 +173,9 @@ class LinearMpc:
 
     def _targets(self, now: Task, reference: np.ndarray, n: int, friction_n: float) -> np.ndarray:
         """Stacked targets, shape (4 N,): the coming reference as far off as the approach allows."""
-        targets = np.empty((n, len(now.target)))  # of one that stands now.target has the place
+        targets = np.empty((n, len(now.target)))
         targets[:] = now.target + friction_n / self.task.area_m2 * BALANCING
-        if now.speed_m_s:
+        if now.speed_m_s:  # else the place in now.target holds all along
             limit = self.task.spec.approach_m
             coming = np.maximum(reference[0, 1 : n + 1], now.x[0] - limit)
             targets[:, 0] = np.minimum(coming, now.x[0] + limit)

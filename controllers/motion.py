@@ -47,7 +47,7 @@ def motion(coming: np.ndarray, sample_time_s: float, limits: MotionLimits) -> np
 class Sliding:
     """Pressures and opening of a moving axis on one mode, (p_a, p_b, opening).
 
-    by_motion   columns of 1, speed, acceleration and jerk, shape (3, 4)
+    by_motion    columns of 1, speed, acceleration and jerk, shape (3, 4)
     """
 
     by_motion: np.ndarray

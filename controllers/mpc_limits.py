@@ -60,14 +60,12 @@ class Limits:
     @cached_property
     def sides(self) -> tuple[np.ndarray, np.ndarray]:
         """What :meth:`bounds` gives for states and a last opening of zero."""
-        n = self.horizon
-        low, high = self.states / np.tile(SLACK_UNIT, n)
-        moved, slack = np.full(n, self.move_v), np.zeros(SLACKS)
-        none = np.full(len(low) + n, np.inf)
-        first, last = (np.full(n, side) for side in self.openings)
-        lower = [first, low, -moved, -none, slack]
-        upper = [last, none, high, moved, slack + np.inf]
-        return np.concatenate(lower), np.concatenate(upper)
+        n, unit = self.horizon, np.ones(len(self.within[0]))
+        unit[n:-n] = np.tile(SLACK_UNIT, n)
+        low, high = (side / unit for side in self.within)
+        none, slack = np.full(len(low) - n, np.inf), np.zeros(SLACKS)
+        upper = [high[:n], none, high[n:], slack + np.inf]
+        return np.concatenate([low, -none, slack]), np.concatenate(upper)
 
 
 def soft_rows(N: int) -> tuple[slice, slice]:

@@ -118,11 +118,8 @@ def test_repeated_at_one_state_it_comes_to_the_optimum_of_the_nonlinear_problem(
     cost += program.R * ca.sumsqr(u - 0.1) + program.S * ca.sumsqr(moves)
     quiet = {"ipopt.print_level": 0, "print_time": False, "ipopt.tol": 1e-10}
     solver = ca.nlpsol("exact", "ipopt", {"x": u, "f": cost}, quiet)
-    wanted = (
-        solver(x0=0.1, lbx=program.limits.openings[0], ubx=program.limits.openings[1])["x"]
-        .full()
-        .ravel()
-    )
+    smallest, largest = program.limits.openings
+    wanted = solver(x0=0.1, lbx=smallest, ubx=largest)["x"].full().ravel()
 
     openings, changes = np.full(n, 0.1), []
     for _ in range(8):
