@@ -13,6 +13,9 @@ nonlinear model; on the way to Neutral, where that is most, every second sample 
 instead of ranking any.  A shift from rest begins with plans that are searched with the design, see
 :mod:`controllers.launches`.
 
+No two valves switch at the same instants.  Where the estimator tells the strength and the flow gain
+of each, as :class:`estimators.shift_filter.ShiftFilter` does, plans are predicted with these.
+
 A shift is fast and lands softly by its cost, see :mod:`controllers.shift_cost`; a switch has
 a price, and what lies within the tolerance costs nothing, so that at rest nothing switches.
 
@@ -37,13 +40,15 @@ from controllers.switching_plans import switching_times
 from linearize.modes import HybridModel
 from linearize.shift_sample import softened
 from linearize.shifting import POSITION, STATES, VELOCITY
-from linearize.valve_response import MASK, age, valve_response
+from linearize.valve_response import MASK, age, valve_responses
+from linearize.valve_spread import AS_DESIGNED, FLOW_GAINS, STRENGTHS, Learned
 from workbench.contracts import Command, Estimate
 from workbench.errors import InputError, Message
 
 SURE = 3.0  # standard deviations beyond which a speed is no noise
 VALVES = ("valve_1", "valve_2")
 LOST_M = 2e-3  # no bounce goes as far: what is further off a position that it met has left it
+STRONGEST, MOST_GAIN = 2.5, 0.25  # of what a filter learns of a valve: no further off is likely
 NEAR_M = 1e-3  # a reference this near to a dedicated position means that position
 
 
@@ -152,7 +157,8 @@ class HybridMpc:
         memory = self._towards(target_m, last.memory, place_m)
         full, shifted = self._full_drive(target_m, memory.sent), _shifted(memory.plans)
         asked_for = query(target_m, memory.start_m, place_m, memory.met)
-        plans, costs = self.search.best(x, asked_for, memory.sent, shifted, full, memory.turn)
+        search = replace(self.search, learned=_learned(estimate))
+        plans, costs = search.best(x, asked_for, memory.sent, shifted, full, memory.turn)
         changed = float((plans[0] != shifted[0]).any())
         cost_s = float(costs[0]) * self.sample_time_s
         notes = {"cost_s": cost_s, "changed": changed, "fallback": 0.0}
@@ -217,6 +223,16 @@ class HybridMpc:
         raise InputError(Message(what, expected=places))
 
 
+def _learned(estimate: Estimate) -> tuple[Learned, Learned]:
+    """What is known of each valve; of an estimator that does not tell, nothing."""
+    if STRENGTHS[0] not in estimate.names:
+        return AS_DESIGNED, AS_DESIGNED
+    strengths = np.clip(estimate.pick(STRENGTHS), -STRONGEST, STRONGEST).tolist()
+    gains = np.clip(estimate.pick(FLOW_GAINS), -MOST_GAIN, MOST_GAIN).tolist()
+    first, second = map(Learned, strengths, gains)
+    return first, second
+
+
 def _shifted(plans: np.ndarray) -> np.ndarray:
     """Plans a sample later, shape (k, 2, N); the last commands go on."""
     return np.concatenate([plans[:, :, 1:], plans[:, :, -1:]], axis=2)
@@ -241,7 +257,7 @@ def hybrid_mpc(hybrid: HybridModel, spec: HybridMpcSpec | None = None) -> Hybrid
         raise InputError(Message(f"is {spec.judged}", "hybrid-mpc.judged", f"< {number**2}"))
     sizes = spec.sample_time_s, spec.horizon, number
     search = PlanSearch(
-        responses=tuple(valve_response(plant, v, spec.sample_time_s, hold) for v in VALVES),
+        responses=valve_responses(plant, VALVES, spec.sample_time_s, hold),
         prediction=shift_prediction(plant, spec.cost, *sizes),
         horizon=spec.horizon,
         judged=spec.judged,

@@ -31,7 +31,7 @@ class Judging(WithLanes):
     A memory is (state (4,), what is left of the way, cost so far); a query that of
     :func:`controllers.shift_prediction.query`, at whose last entry the way begins.
 
-    sample     (memory, share (2,), query, weight) -> memory a sample later
+    sample     (memory, shares (4,), query, weight) -> memory a sample later
     last       (memory, query) -> cost of the whole
     weights    of the samples, shape (N,)
     """
@@ -41,7 +41,7 @@ class Judging(WithLanes):
     weights: np.ndarray
 
     def costs(self, x: np.ndarray, shares: np.ndarray, query: np.ndarray) -> np.ndarray:
-        """Costs in samples, shape (n,), of n >= 1 shares (n, N, 2) from a state (4,).
+        """Costs in samples, shape (n,), of n >= 1 shares (n, N, 4) from a state (4,).
 
         Raises
         ------
@@ -49,7 +49,7 @@ class Judging(WithLanes):
             If a shape is another one.
         """
         begun = np.array([*x, query[-1], 0.0])
-        shapes = ((6,), (max(len(shares), 1), len(self.weights), 2), (4,))
+        shapes = ((6,), (max(len(shares), 1), len(self.weights), 4), (4,))
         given = filled((begun, shares, query), shapes)
         if self._lanes is None:
             return self._one_by_one(*given)
@@ -61,21 +61,21 @@ class Judging(WithLanes):
     def _one_by_one(self, begun: np.ndarray, shares: np.ndarray, query: np.ndarray) -> np.ndarray:
         missing = -len(shares) % AT_ONCE
         whole = np.concatenate([shares, np.repeat(shares[-1:], missing, axis=0)])
-        parts = whole.reshape(-1, AT_ONCE * len(self.weights) * 2)
+        parts = whole.reshape(-1, AT_ONCE * len(self.weights) * 4)
         costs = np.concatenate([self._by_casadi(begun, part, query)[0] for part in parts])
         return costs[: len(shares)]
 
     @cached_property
     def _by_casadi(self) -> Callable[..., list[np.ndarray]]:
-        """(memory, shares (2, N AT_ONCE), query) -> costs (AT_ONCE,), by CasADi alone."""
+        """(memory, shares (4, N AT_ONCE), query) -> costs (AT_ONCE,), by CasADi alone."""
         horizon = len(self.weights)
-        begun, shares = ca.MX.sym("begun", 6), ca.MX.sym("shares", 2, horizon)
+        begun, shares = ca.MX.sym("begun", 6), ca.MX.sym("shares", 4, horizon)
         asked = ca.MX.sym("query", 4)
         weights = ca.DM(self.weights).T
         done = self.sample.fold(horizon)(begun, shares, ca.repmat(asked, 1, horizon), weights)
         plan = ca.Function("plan", [begun, shares, asked], [self.last(done, asked)])
         many = plan.map("plans", "serial", AT_ONCE, [0, 2], [])
-        inputs = [begun, ca.MX.sym("all", 2, horizon * AT_ONCE), asked]
+        inputs = [begun, ca.MX.sym("all", 4, horizon * AT_ONCE), asked]
         return prepared(compiled(ca.Function("judged", inputs, [many(*inputs).T])))
 
     @cached_property

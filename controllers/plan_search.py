@@ -16,16 +16,14 @@ The nonlinear model judges each, so a plan is only changed for one that this pre
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from controllers.shift_prediction import ShiftPrediction
 from controllers.switching_plans import Plans, every_plan, moved, plans
 from linearize.valve_response import ValveResponse, age, packed
-from workbench.called import prepared
+from linearize.valve_spread import AS_DESIGNED, Learned
 
 KEPT = 8  # plans that a sample hands on to the next
 RANKED = 4  # plans at least that come from the affine modes
@@ -45,6 +43,7 @@ class PlanSearch:
     judged      plans that the nonlinear model judges at a sample that ranks others, besides the
                 last one; twice as many at one that does not
     price       of a switch, in samples of the whole way
+    learned     of each valve
     """
 
     responses: tuple[ValveResponse, ValveResponse]
@@ -52,6 +51,7 @@ class PlanSearch:
     horizon: int
     judged: int
     price: float
+    learned: tuple[Learned, Learned] = (AS_DESIGNED, AS_DESIGNED)
 
     def best(
         self,
@@ -85,7 +85,7 @@ class PlanSearch:
         self, x: np.ndarray, query: np.ndarray, sent: tuple[int, int], asked: np.ndarray
     ) -> np.ndarray:
         """Costs of plans by the nonlinear model, in samples, shape (n,)."""
-        shares = np.stack(self._shares(sent, asked.transpose(1, 0, 2)), axis=-1)
+        shares = np.concatenate(self._shares(sent, asked.transpose(1, 0, 2)), axis=-1)
         by_model = self.prediction.judging.costs(x, shares, query)
         standing = np.broadcast_to(self.held(sent)[:, :1], (len(asked), 2, 1))
         switches = np.abs(np.diff(asked, axis=2, prepend=standing)).sum(axis=(1, 2))
@@ -117,12 +117,13 @@ class PlanSearch:
     ) -> np.ndarray:
         """The best pairs of plans under the modes along the last plan, shape (judged, 2, N)."""
         N, both = self.horizon, [self.plans(s) for s in sent]
-        along = np.array(self._shares(sent, before))
-        way, columns = self._linearised(x, along.T.ravel())
-        by_share = columns.reshape(2 * N, 2 * N)  # a row for each share, as CasADi stores columns
+        along = self._shares(sent, before)
+        way, columns = self.prediction.along(x, np.concatenate(along, axis=1).ravel())
+        by_share = columns.reshape(2, 2 * N, 2 * N)  # a row for each share: CasADi's columns
+        valves = zip(self.responses, sent, both, self.learned, along, by_share, strict=True)
         moves = [
-            (response.ahead(s, p.packed) - along[v]) @ by_share[N * v : N * (v + 1)]
-            for v, (response, s, p) in enumerate(zip(self.responses, sent, both, strict=True))
+            (response.ahead(s, p.packed, learned) - was).reshape(-1, 2 * N) @ slopes
+            for response, s, p, learned, was, slopes in valves
         ]
         costs = self.prediction.ranking.costs(way, moves, query)
         costs += self.price * np.add.outer(*(p.switches for p in both)).ravel()
@@ -141,18 +142,9 @@ class PlanSearch:
         return np.stack([row[k] for row, k in zip(rows, picked, strict=True)], axis=1)
 
     def _shares(self, sent: tuple[int, int], commands: np.ndarray) -> list[np.ndarray]:
-        """Shares of each valve under commands of shape (2, ..., N)."""
-        pairs = zip(self.responses, sent, commands, strict=True)
-        return [response.ahead(s, packed(ahead)) for response, s, ahead in pairs]
-
-    @cached_property
-    def _linearised(self) -> Callable[..., list[np.ndarray]]:
-        """The function of the prediction, ready to be called at every sample."""
-        return prepared(self.prediction.linearised)
-
-    def __getstate__(self) -> dict[str, object]:
-        """Without what another process makes anew."""
-        return {key: value for key, value in self.__dict__.items() if key != "_linearised"}
+        """Shares of each valve, shape (..., N, 2), under commands of shape (2, ..., N)."""
+        valves = zip(self.responses, sent, commands, self.learned, strict=True)
+        return [response.ahead(s, packed(ahead), learned) for response, s, ahead, learned in valves]
 
 
 def _distinct(asked: np.ndarray, order: np.ndarray) -> np.ndarray:

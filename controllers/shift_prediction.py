@@ -7,7 +7,9 @@ modes, in which the effects of the two valves add up.  The cost is :mod:`control
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 
 import casadi as ca
@@ -18,6 +20,8 @@ from controllers.ranking import Ranking
 from controllers.shift_cost import ShiftCost, beyond_weights, end_cost, stage_cost
 from linearize.shift_sample import half_stroke_m, one_sample, softened
 from linearize.shifting import POSITION
+from linearize.valve_sample import standing
+from workbench.called import prepared
 from workbench.compiled import compiled
 from workbench.errors import InputError, Message, listed
 from workbench.plant import Plant
@@ -29,7 +33,8 @@ LONG_S, NEAREST_M = 0.3, 4e-3  # when a shift is over, and how far Neutral swing
 class ShiftPrediction:
     """Compiled functions over N samples; what is asked for is a :func:`query`.
 
-    linearised    (x, shares (2, N)) -> positions and velocities (2 N,), their slopes (2 N, 2 N)
+    linearised    (x, shares (4, N)) -> positions and velocities (2 N,), their slopes (2 N, 4 N)
+                  in the shares: those of the first valve, of each sample both, then the second's
     ranking       the costs of every pair of plans under these modes
     judging       the costs of plans by the nonlinear model
     """
@@ -37,6 +42,15 @@ class ShiftPrediction:
     linearised: ca.Function
     ranking: Ranking
     judging: Judging
+
+    @cached_property
+    def along(self) -> Callable[..., list[np.ndarray]]:
+        """``linearised``, ready to be called at every sample."""
+        return prepared(self.linearised)
+
+    def __getstate__(self) -> dict[str, object]:
+        """Without what another process makes anew."""
+        return {key: value for key, value in self.__dict__.items() if key != "along"}
 
 
 def shift_prediction(
@@ -83,7 +97,7 @@ def drives(plant: Plant, sample_time_s: float) -> dict[float, tuple[int, int]]:
     for commands in product((0, 1), repeat=2):
         x = np.tile(model.initial[:, None], 3)
         x[place] = places
-        ends = [float(run(start, list(commands))[place]) for start in x.T]
+        ends = [float(run(start, standing(commands))[place]) for start in x.T]
         for target_m in places:
             if max(abs(end - target_m) for end in ends) < NEAREST_M:
                 found[target_m] = commands
@@ -95,15 +109,15 @@ def drives(plant: Plant, sample_time_s: float) -> dict[float, tuple[int, int]]:
 
 
 def _linearised(step: ca.Function, horizon: int) -> ca.Function:
-    x, share, now = ca.SX.sym("x", 4), ca.SX.sym("share", 2), ca.SX.sym("now", horizon)
-    slopes = ca.SX.sym("slopes", 4, 2 * horizon)
+    x, share, now = ca.SX.sym("x", 4), ca.SX.sym("share", 4), ca.SX.sym("now", horizon)
+    slopes = ca.SX.sym("slopes", 4, 4 * horizon)
     later = step(x, share)[0]
     A, B = ca.jacobian(later, x), ca.jacobian(later, share)
-    pushed = A @ slopes + ca.horzcat(B[:, 0] @ now.T, B[:, 1] @ now.T)
+    pushed = A @ slopes + ca.horzcat(ca.kron(now.T, B[:, :2]), ca.kron(now.T, B[:, 2:]))
     one = ca.Function("one", [x, slopes, share, now], [later, pushed])
-    start, shares = ca.MX.sym("x", 4), ca.MX.sym("shares", 2, horizon)
+    start, shares = ca.MX.sym("x", 4), ca.MX.sym("shares", 4, horizon)
     way, slope = [], []
-    at, grown = start, ca.MX(4, 2 * horizon)
+    at, grown = start, ca.MX(4, 4 * horizon)
     for k in range(horizon):
         at, grown = one(at, ca.densify(grown), shares[:, k], ca.DM(np.eye(horizon)[k]))
         way.append(at[2:])
@@ -131,7 +145,7 @@ def _judging(
     step: ca.Function, stage: ca.Function, end: ca.Function, weights: np.ndarray
 ) -> Judging:
     weight, total = ca.SX.sym("weight"), ca.SX.sym("total")
-    x, share, query = ca.SX.sym("x", 4), ca.SX.sym("share", 2), ca.SX.sym("query", 4)
+    x, share, query = ca.SX.sym("x", 4), ca.SX.sym("share", 4), ca.SX.sym("query", 4)
     far = ca.SX.sym("far")
     later, met_m_s = step(x, share)
     paid, left = stage(far, later[2], met_m_s, query, weight)

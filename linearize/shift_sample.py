@@ -1,10 +1,10 @@
 """The gearbox actuator over one sample, as controllers and estimators predict it.
 
 The model is the reduced one of :mod:`linearize.shifting` with dry friction, detent and wall heat,
-state (p1, p2, x, v); its valves pass the share e of their charging flow and 1 - e of their venting
-one, see :mod:`linearize.valve_response`.  A stop returns a share of the speed; a floating piston is
-picked up at Neutral without rebound.  A sample is one step of ROS2, linearly implicit in the
-velocity alone, which dry friction makes stiff.
+state (p1, p2, x, v).  Each valve passes a share of its charging flow and one of its venting flow,
+see :mod:`linearize.valve_sample`; shares are (charging 1, venting 1, charging 2, venting 2).  A
+stop returns a share of the speed; a floating piston is picked up at Neutral without rebound.  A
+sample is one step of ROS2, linearly implicit in the velocity alone, which dry friction makes stiff.
 
 Source: Verwer et al. 1999, "A second-order Rosenbrock method applied to photochemical dispersion
 problems" (ROS2 keeps its order with any approximation of the Jacobian).
@@ -21,6 +21,7 @@ from linearize.shifting import (
     PRESSURES,
     VELOCITY,
     carried_share,
+    shift_model,
     switched_shift_model,
 )
 from workbench.effects.forces import EndStops
@@ -48,24 +49,24 @@ def half_stroke_m(plant: Plant) -> float:
 
 
 def one_sample(model: DesignModel, stroke_m: float, dt: float, *, stops: bool) -> ca.Function:
-    """(x, share (2,)) -> (x one sample later, velocity before what it met at the end of it).
+    """(x, shares (4,)) -> (x one sample later, velocity before what it met at the end of it).
 
     Without stops the piston goes on beyond, in a volume that no longer shrinks: what an affine mode
     needs, since a stopped piston has no slope.
     """
-    x, share = model.symbols[0], ca.SX.sym("share", 2)
+    x, shares = model.symbols[0], ca.SX.sym("shares", 4)
     place, speed = model.states.index(POSITION), model.states.index(VELOCITY)
     rates = _rates(model, stroke_m)
-    slope = ca.jacobian(rates(x, share)[speed], x[speed])
-    hindered = ca.Function("hindered", [x, share], [slope])
+    slope = ca.jacobian(rates(x, shares)[speed], x[speed])
+    hindered = ca.Function("hindered", [x, shares], [slope])
 
     def damped(at: ca.SX, right: ca.SX) -> ca.SX:
         unit = [1.0] * len(model.states)
-        unit[speed] = 1.0 / (1.0 - GAMMA * dt * hindered(at, share))
+        unit[speed] = 1.0 / (1.0 - GAMMA * dt * hindered(at, shares))
         return ca.vertcat(*unit) * right
 
-    k1 = damped(x, rates(x, share))
-    k2 = damped(x, rates(x + dt * k1, share) - 2.0 * k1)
+    k1 = damped(x, rates(x, shares))
+    k2 = damped(x, rates(x + dt * k1, shares) - 2.0 * k1)
     later = x + dt * (1.5 * k1 + 0.5 * k2)
     for name in PRESSURES:
         row = model.states.index(name)
@@ -78,16 +79,21 @@ def one_sample(model: DesignModel, stroke_m: float, dt: float, *, stops: bool) -
         outwards = ca.logic_and(outwards, later[place] * later[speed] > 0.0)
         later[speed] *= ca.if_else(outwards, -REBOUND, 1.0)
         later[place] = ca.fmin(ca.fmax(later[place], -stroke_m), stroke_m)
-    return ca.Function("one_sample", [x, share], [later, met_m_s])
+    return ca.Function("one_sample", [x, shares], [later, met_m_s])
 
 
 def _rates(model: DesignModel, stroke_m: float) -> ca.Function:
-    """(x, share) -> dx/dt, mixed of both ends of each valve; inside the stops, which act apart."""
-    x, share = model.symbols[0], ca.SX.sym("share", 2)
+    """(x, shares) -> dx/dt; inside the stops, which act apart.
+
+    Both valves held at an end pass all that this end passes, a model without valves nothing.
+    """
+    x, shares = model.symbols[0], ca.SX.sym("shares", 4)
     place, end_m = model.states.index(POSITION), stroke_m - INSIDE_M
     inside = ca.SX(x)
     inside[place] = ca.fmin(ca.fmax(x[place], -end_m), end_m)
-    f = ca.Function("f", [*model.symbols], [model.f(*model.symbols)[0]])
-    none, first, second = (f(inside, u) for u in ([0, 0], [1, 0], [0, 1]))
-    mixed = none + share[0] * (first - none) + share[1] * (second - none)
-    return ca.Function("rates", [x, share], [ca.cse(mixed)])
+    rates = shift_model(model.plant, omitted=()).f(inside, [0.0, 0.0])[0]
+    charging, venting = (model.f(inside, [u, u])[0] - rates for u in (1.0, 0.0))
+    for k, name in enumerate(PRESSURES):
+        row = model.states.index(name)
+        rates[row] += shares[2 * k] * charging[row] + shares[2 * k + 1] * venting[row]
+    return ca.Function("rates", [x, shares], [ca.cse(rates)])

@@ -39,8 +39,8 @@ BOUNDS = (
 OPEN_LOOP = "open_loop."  # before the names of its channels in the record of a shift
 NOISE = {**dict.fromkeys(PRESSURES, 1e3), POSITION: 2e-5}
 PROCESS = {
-    "chamber_1.pressure_pa": 2e5,
-    "chamber_2.pressure_pa": 2e5,
+    "chamber_1.pressure_pa": 1e5,
+    "chamber_2.pressure_pa": 1e5,
     POSITION: 1e-4,
     VELOCITY: 2.0,
 }
@@ -176,7 +176,7 @@ def _beside(record: LoopRecord, open_loop: LoopRecord) -> LoopRecord:
 
 @cache
 def shift_filter(plant: Plant, sample_time_s: float) -> ShiftFilter:
-    """The estimator of a plant, made once: its tables take longer than a shift."""
+    """The estimator of a plant, made once: its valves take longer than a shift."""
     return ShiftFilter(
         plant=plant, sample_time_s=sample_time_s, measurement_noise=NOISE, process_noise=PROCESS
     )

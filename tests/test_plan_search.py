@@ -1,22 +1,25 @@
 """What hybrid MPC searches at each sample and with the design, and what an arrival costs."""
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
 import pytest
 
 from controllers.design_file import design
-from controllers.hybrid_mpc import HybridMpcSpec
+from controllers.hybrid_mpc import MOST_GAIN, STRONGEST, HybridMpcSpec, _learned
 from controllers.launches import RELEASED, pulse_pairs
 from controllers.plan_search import KEPT
 from controllers.shift_cost import end_cost, stage_cost
 from controllers.shift_prediction import query
 from controllers.switching_plans import every_plan, moved
 from linearize.shifting import STATES
-from linearize.valve_response import packed
+from linearize.valve_response import MASK, packed, valve_response
+from linearize.valve_spread import AS_DESIGNED, FLOW_GAINS, STRENGTHS, Learned, valve_spread
 from studies.gear_shift_study import _truth
 from studies.shift_check import check_shifts
 from workbench.called import called
+from workbench.contracts import Estimate
 from workbench.plants.gearbox import gearbox
 
 HOLD, N = 4, 26
@@ -77,15 +80,14 @@ def test_what_plans_cost_does_not_depend_on_how_many_are_asked(made):
 
 def test_a_plan_costs_what_the_model_says_and_a_price_for_every_switch(made):
     """Nothing for a valve that goes on as it is, one at once for one that does not."""
-    x, asked, sent = rest(-END_M), query(0.0, -END_M, -END_M), (2**20 - 1, 0)
+    x, asked, sent = rest(-END_M), query(0.0, -END_M, -END_M), (MASK, 0)
     plan = np.zeros((1, 2, N), dtype=int)
     plan[0, 0, :6], plan[0, 1, 8:14] = 1, 1
-    shares = np.stack(
+    shares = np.hstack(
         [
             r.ahead(s, packed(row))
             for r, s, row in zip(made.search.responses, sent, plan[0], strict=True)
-        ],
-        axis=-1,
+        ]
     )
     (by_model,) = made.search.prediction.judging.costs(x, shares[None], asked)
     (cost,) = made.search.costs(x, asked, sent, plan)
@@ -97,16 +99,16 @@ def test_a_plan_costs_what_the_model_says_and_a_price_for_every_switch(made):
 def test_the_best_ranked_pairs_are_the_cheapest_of_every_pair_of_plans(made):
     """Valves of unequal past, whose plans differ: each pair is the plans that were ranked."""
     x, asked = np.array([3e5, 1.5e5, -6e-3, 0.8]), query(0.0, -END_M, -6e-3)
-    search, sent = made.search, (2**20 - 1, 0b11)
+    search, sent = made.search, (MASK, 0b11)
     before = np.stack([np.ones(N, dtype=int), np.repeat([1, 0], [2, N - 2])])
     ways = [search.plans(s) for s in sent]
-    along = np.array(search._shares(sent, before))
-    place, slope = called(search.prediction.linearised, x, along)
+    along = search._shares(sent, before)
+    place, slope = called(search.prediction.linearised, x, np.hstack(along).T)
     number = len(ways[0].switches)
     nothing, costs, pairs = [np.zeros((number, 2 * N))] * 2, [], []
     for i, j in product(range(number), repeat=2):
         pairs.append(np.stack([ways[0].commands[i], ways[1].commands[j]]))
-        moved_by = np.array(search._shares(sent, pairs[-1])) - along
+        moved_by = np.array(search._shares(sent, pairs[-1])) - np.array(along)
         row = place.ravel() + slope @ moved_by.ravel()
         switches = ways[0].switches[i] + ways[1].switches[j]
         costs.append(search.prediction.ranking.costs(row, nothing, asked)[0])
@@ -129,6 +131,39 @@ def test_a_sample_hands_on_different_plans_by_rising_cost(made, turn):
     assert (np.diff(cost) >= 0.0).all()
     assert len(np.unique(plans.reshape(len(plans), -1), axis=0)) == len(plans)
     assert made.search.keep(sent, plans).all()
+
+
+def test_plans_are_predicted_with_what_a_filter_has_learned_of_the_valves(made):
+    """A stronger valve 1: nearer to the costs by its own table than as designed."""
+    plans = pulse_pairs(HOLD, N)[::151]
+    stronger, _ = valve_spread(gearbox(), "valve_1", 1e-3)[0]
+    _, second = made.search.responses
+    own = (valve_response(stronger, "valve_1", 1e-3, HOLD), second)
+    asked = query(0.0, -END_M, -END_M)
+
+    def found(search):
+        return search.costs(rest(-END_M), asked, RELEASED, plans)
+
+    truth = found(replace(made.search, responses=own))
+    learned = found(replace(made.search, learned=(Learned(1.0), AS_DESIGNED)))
+    rms = [np.sqrt(np.mean((each - truth) ** 2)) for each in (learned, found(made.search))]
+
+    assert rms[0] < 0.4 * rms[1]
+
+
+def test_what_is_learned_of_valves_changes_what_is_sent(made):
+    """An estimator that does not tell of them leaves them as designed."""
+    x, noise = np.array([*rest(-END_M)]), np.eye(8) * 1e-6
+    far = np.array([5.0, -0.5, -0.4, 0.02])
+    told = Estimate((*STATES, *STRENGTHS, *FLOW_GAINS), np.append(x, far), noise)
+
+    assert _learned(Estimate(STATES, x, noise[:4, :4])) == (AS_DESIGNED, AS_DESIGNED)
+    assert _learned(told) == (Learned(STRONGEST, -MOST_GAIN), Learned(-0.5, 0.02))
+    ways = [
+        made.step(made.start(), np.array([[0.0]]), each).memory.plan
+        for each in (told, Estimate(STATES, x, noise[:4, :4]))
+    ]
+    assert not np.array_equal(*ways)
 
 
 def test_what_may_not_be_switched_yet_is_no_plan(made):
