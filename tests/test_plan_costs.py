@@ -31,7 +31,8 @@ def shares(made):
     rng, horizon = np.random.default_rng(3), made.spec.horizon
     first, last = np.sort(rng.integers(0, horizon, (2, 11, 2, 1)), axis=0)
     ahead = np.arange(horizon)
-    return ((ahead >= first) & (ahead <= last)).transpose(0, 2, 1).astype(float)
+    held = ((ahead >= first) & (ahead <= last)).transpose(0, 2, 1).astype(float)
+    return np.stack([held, 1.0 - held], axis=3).reshape(11, horizon, 4)
 
 
 @needs_lanes
@@ -85,6 +86,7 @@ def test_what_has_another_shape_is_refused(made, shares):
     for x, rows, q in (
         (MOVING[:3], shares, asked),
         (MOVING, shares[:, :20], asked),
+        (MOVING, shares[:, :, :2], asked),
         (MOVING, shares[:0], asked),
         (MOVING, shares, asked[:3]),
     ):
