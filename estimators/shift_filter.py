@@ -44,7 +44,7 @@ from workbench.plant import Plant
 VALVES = ("valve_1", "valve_2")
 NAMES = (*STATES, *STRENGTHS, *FLOW_GAINS)
 START_M_S = 0.01
-STRENGTH, FLOW_GAIN = 1.0, 0.07  # deviations before anything is seen: of a valve, of its flow
+FLOW_GAIN = 0.07  # deviation before anything is seen
 FORGOTTEN_S = 1.0  # in which what was learned of valves fades: a coil warms, a supply falls
 NO_CHARGE, NO_VENT = 0.75, 1.5  # pressure over that of supply and atmosphere: nothing is learned
 WITHIN = (0.15, 0.5)  # ratios within which it is learned in part
@@ -72,12 +72,16 @@ class ShiftFilter:
         Standard deviation of both pressures and of the position, by name.
     process_noise
         Standard deviation that each of the four states gains per square root of a second.
+    strength
+        Standard deviation of the strength of a valve before anything is seen: 1 as the plant has
+        it, less where its valves were measured or fitted.
     """
 
     plant: Plant
     sample_time_s: float
     measurement_noise: Mapping[str, float]
     process_noise: Mapping[str, float]
+    strength: float = 1.0
 
     def __getstate__(self) -> dict[str, object]:
         """Without what another process makes anew."""
@@ -159,7 +163,7 @@ class ShiftFilter:
     @property
     def _learned(self) -> np.ndarray:
         """Deviations of strengths and flow gains before anything is seen, shape (4,)."""
-        return np.repeat([STRENGTH, FLOW_GAIN], 2)
+        return np.repeat([self.strength, FLOW_GAIN], 2)
 
     @cached_property
     def _rows(self) -> list[int]:

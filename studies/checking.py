@@ -26,7 +26,7 @@ from studies.following import BENCHES
 from studies.following_check import FollowingCheck, check_followed, tasks_of
 from studies.sample_times import require_multiple
 from studies.scenarios import SCENARIOS
-from studies.shift_check import SHIFTS, ShiftCheck, check_shifts
+from studies.shift_check import SHIFTS, ShiftCheck, check_shifts, valves_off
 from studies.text import shown
 from workbench.contracts import Controller
 from workbench.errors import InputError, Message, listed
@@ -76,7 +76,12 @@ class Loops:
         believed, name = self.rig.plant, self.rig.plant.name
         if name in SHIFT_MODES:
             return check_shifts(
-                plant, self.controllers, self.scenarios, believed=believed, seed=seed
+                plant,
+                self.controllers,
+                self.scenarios,
+                believed=believed,
+                seed=seed,
+                strength=valves_off(self.rig),
             )
         closed = check_followed if name in BENCHES else check
         return closed(

@@ -26,7 +26,16 @@ from studies.checking import apart, drawn, styled_figures
 from studies.commissioning import claims as claims_after
 from studies.commissioning import commissioned, made_on_every_plant, reached_table
 from studies.kept import Kept, Row
-from studies.shift_check import FEWER, SHIFTS, Shift, ShiftCheck, check_shifts, shift_table
+from studies.shift_check import (
+    FEWER,
+    SHIFTS,
+    VALVES,
+    Shift,
+    ShiftCheck,
+    check_shifts,
+    shift_table,
+    valves_off,
+)
 from studies.study import Claim, Extent, Outcome, Study
 from studies.versions import work_folder
 from studies.workers import chosen_workers
@@ -39,7 +48,6 @@ SUPPLIES_PA = (7e5, 8e5, 9e5, 10e5)
 DRAWS = {Extent.QUICK: 3, Extent.FULL: 30}
 FIRST_SEED = 1  # of the draws
 SUPPLY = "supply.pressure_pa"
-VALVES = ("valve_1.", "valve_2.")
 HYBRID, PD, LQ, SCHEDULED = "hybrid MPC", "PD", "LQ", "scheduled LQ"
 
 
@@ -126,19 +134,27 @@ def _draw(number: int) -> Row:
     plant, own = gearbox(), f"{HYBRID} {number + 1}"
     truth = _truth(number)
 
-    def known_as(believed: Plant) -> tuple[Shift, ...]:
-        made = {own: hybrid(believed)}
-        return check_shifts(truth, made, SHIFTS, believed=believed, seed=number).rows
+    def known_as(believed: Plant, strength: float = 0.0) -> tuple[Shift, ...]:
+        found = check_shifts(
+            truth,
+            {own: hybrid(believed)},
+            SHIFTS,
+            believed=believed,
+            seed=number,
+            strength=strength,
+        )
+        return found.rows
 
     made = {f"{name} {number + 1}": found for name, found in _compared().items()}
     rows = check_shifts(truth, made, SHIFTS, believed=plant, seed=number).rows
     quick = design("hybrid-mpc", truth, {"judged": FEWER}).controller
+    fitted = commissioned(truth, number).rig
     groups = {
         "shifts": rows,
         "valves": known_as(valves_alone(truth)),
-        "after": known_as(commissioned(truth, number).rig.plant),
+        "after": known_as(fitted.plant, valves_off(fitted)),
         "known": known_as(truth),
-        "fewer": check_shifts(truth, {own: quick}, SHIFTS, seed=number).rows,
+        "fewer": check_shifts(truth, {own: quick}, SHIFTS, seed=number, strength=0.0).rows,
     }
     return {key: [vars(row) for row in found] for key, found in groups.items()}
 

@@ -27,6 +27,7 @@ from workbench.contracts import Command, Controller, Estimate
 from workbench.filtering import consistent_start
 from workbench.plant import Plant
 from workbench.plants.gearbox import COMMANDS, FINGER_M, FLOATING, MAIN
+from workbench.rig import Rig
 
 SAMPLE_TIME_S, LASTS_S, LATE_S = 2.5e-4, 0.08, 0.01
 SETTLED_M, OVERSHOT_M = 0.3e-3, 0.5e-3
@@ -36,6 +37,7 @@ BOUNDS = (
     f"bounds: {SLOWER:g} times the time of the open loop; {SOFTER:g} times its impact, "
     f"or {SOFT_M_S:g} m/s where that is more"
 )
+VALVES = ("valve_1.", "valve_2.")
 OPEN_LOOP = "open_loop."  # before the names of its channels in the record of a shift
 NOISE = {**dict.fromkeys(PRESSURES, 1e3), POSITION: 2e-5}
 PROCESS = {
@@ -132,6 +134,7 @@ def check_shifts(
     *,
     believed: Plant | None = None,
     seed: int = 0,
+    strength: float = 1.0,
 ) -> ShiftCheck:
     """Every design in every shift, each beside the open loop.
 
@@ -139,16 +142,18 @@ def check_shifts(
     ----------
     believed
         The plant in the estimator, the same one by default.
+    strength
+        How far its valves may be off, see :class:`estimators.shift_filter.ShiftFilter`.
     """
     truth, model = plant.lean(), (believed or plant).lean()
     leading, rows, records = drives(plant, 1e-3), [], []
     for scenario in scenarios:
         target_m = SHIFTS[scenario][1] * half_stroke_m(plant)
         open_loop = Drive(leading[target_m])
-        beside = run(truth, open_loop, shift_filter(model, 1e-3), scenario, seed)
+        beside = run(truth, open_loop, shift_filter(model, 1e-3, strength), scenario, seed)
         bound = _measured(truth, beside, scenario)
         for design, controller in designs.items():
-            observer = shift_filter(model, controller.sample_time_s)
+            observer = shift_filter(model, controller.sample_time_s, strength)
             record = run(truth, controller, observer, scenario, seed)
             rows.append(_bounded(_measured(truth, record, scenario), design, bound))
             records.append(_beside(record, beside))
@@ -175,11 +180,28 @@ def _beside(record: LoopRecord, open_loop: LoopRecord) -> LoopRecord:
 
 
 @cache
-def shift_filter(plant: Plant, sample_time_s: float) -> ShiftFilter:
+def shift_filter(plant: Plant, sample_time_s: float, strength: float = 1.0) -> ShiftFilter:
     """The estimator of a plant, made once: its valves take longer than a shift."""
     return ShiftFilter(
-        plant=plant, sample_time_s=sample_time_s, measurement_noise=NOISE, process_noise=PROCESS
+        plant=plant,
+        sample_time_s=sample_time_s,
+        measurement_noise=NOISE,
+        process_noise=PROCESS,
+        strength=strength,
     )
+
+
+def valves_off(rig: Rig) -> float:
+    """How far valves may be off what a rig says, over what their plant says: 1 of a default rig.
+
+    Less of a fitted one, as the root of the mean square over all that is uncertain of its valves.
+    """
+    plant, shares = rig.plant, []
+    for name, known in plant.parameters.items():
+        own = known.standard_deviation(plant.values[name])
+        if name.startswith(VALVES) and own:
+            shares.append(rig.standard_deviation(name) / own)
+    return float(np.sqrt(np.mean(np.square(shares)))) if shares else 0.0
 
 
 def run(

@@ -1,6 +1,7 @@
 """The filter of gear shifts: what it learns of two valves from the full nonlinear plant."""
 
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,10 +10,11 @@ from estimators.shift_filter import NAMES, ShiftFilter
 from linearize.shifting import POSITION, PRESSURES, STATES, VELOCITY
 from linearize.valve_spread import FLOW_GAINS, STRENGTHS, valve_spread
 from studies.gear_shift_study import _truth
-from studies.shift_check import NOISE, PROCESS, run, shift_filter
+from studies.shift_check import NOISE, PROCESS, run, shift_filter, valves_off
 from studies.shift_check import Drive as Held
 from workbench.filtering import consistent_start
 from workbench.plants.gearbox import FINGER_M, gearbox
+from workbench.rig import default_rig
 
 SEEDS = range(40, 48)
 
@@ -166,6 +168,26 @@ def test_a_plant_with_more_effects_is_filtered_too(values):
     place = (record.estimates[POSITION] - record.recording[POSITION])[:60:4]
 
     assert np.sqrt(np.mean(place**2)) < 5e-5
+
+
+def test_a_fitted_rig_says_how_far_its_valves_may_be_off():
+    rig = default_rig(gearbox())
+    fitted = {
+        name: 0.5 * rig.standard_deviation(name)
+        for name in rig.plant.values
+        if name.startswith("valve_")
+    }
+
+    assert valves_off(rig) == pytest.approx(1.0)
+    assert valves_off(replace(rig, deviations=fitted)) == pytest.approx(0.5)
+
+
+def test_a_filter_that_knows_its_valves_learns_nothing_of_them():
+    weak = gearbox().with_values({"valve_1.supply_voltage_v": 22.8}).lean()
+    sure = shift_filter(gearbox().lean(), 1e-3, 0.0)
+    found = estimates(weak, (1, 1), "l-n", 0, sure)
+
+    assert (np.array([found[name] for name in STRENGTHS]) == 0.0).all()
 
 
 def test_a_filter_travels_to_another_process():
