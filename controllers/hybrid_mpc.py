@@ -41,12 +41,12 @@ from linearize.modes import HybridModel
 from linearize.shift_sample import softened
 from linearize.shifting import POSITION, STATES, VELOCITY
 from linearize.valve_response import MASK, age, valve_responses
+from linearize.valve_sample import VALVES
 from linearize.valve_spread import AS_DESIGNED, FLOW_GAINS, STRENGTHS, Learned
 from workbench.contracts import Command, Estimate
 from workbench.errors import InputError, Message
 
 SURE = 3.0  # standard deviations beyond which a speed is no noise
-VALVES = ("valve_1", "valve_2")
 LOST_M = 2e-3  # no bounce goes as far: what is further off a position that it met has left it
 STRONGEST, MOST_GAIN = 2.5, 0.25  # of what a filter learns of a valve: no further off is likely
 NEAR_M = 1e-3  # a reference this near to a dedicated position means that position

@@ -27,7 +27,7 @@ import numpy as np
 
 from linearize.shift_sample import half_stroke_m, one_sample, softened
 from linearize.shifting import PRESSURES, STATES, VELOCITY
-from linearize.valve_sample import ends_pa
+from linearize.valve_sample import VALVES, ends_pa
 from linearize.valve_spread import (
     FLOW_GAINS,
     STRENGTHS,
@@ -41,7 +41,6 @@ from workbench.contracts import Estimate
 from workbench.filtering import correct, predict
 from workbench.plant import Plant
 
-VALVES = ("valve_1", "valve_2")
 NAMES = (*STATES, *STRENGTHS, *FLOW_GAINS)
 START_M_S = 0.01
 FLOW_GAIN = 0.07  # deviation before anything is seen

@@ -20,6 +20,7 @@ from workbench.errors import InputError, Message
 from workbench.plant import Plant
 from workbench.rosenbrock import controlled_step
 
+VALVES = ("valve_1", "valve_2")
 FINER = 4  # instants of one sample over which the flow is averaged
 CHARGING, VENTING = 0, 1  # rows of the flows and shares
 STANDING_PA = 3e5  # chamber pressure under which the armature moves: that of a shift

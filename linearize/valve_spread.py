@@ -21,14 +21,14 @@ from typing import NamedTuple, TypeVar
 import casadi as ca
 import numpy as np
 
-from linearize.valve_sample import CHARGING, valve_ends, valve_sample
+from linearize.valve_sample import CHARGING, VALVES, valve_ends, valve_sample
 from workbench.compiled import compiled
 from workbench.plant import Plant
 
 FIRST = 6  # samples of the first pulse of the trial
 TRIAL = np.repeat([1.0, 0.0, 1.0, 0.0], [FIRST, 12, 20, 20])  # commands that tell valves apart
-STRENGTHS = ("valve_1.strength", "valve_2.strength")
-FLOW_GAINS = ("valve_1.flow_gain", "valve_2.flow_gain")
+STRENGTHS = tuple(f"{valve}.strength" for valve in VALVES)
+FLOW_GAINS = tuple(f"{valve}.flow_gain" for valve in VALVES)
 LEAST = 1e-3  # of the shares over the trial: a direction that does less does nothing
 
 Pair = tuple[Plant, Plant]

@@ -76,7 +76,9 @@ def test_a_valve_opens_late_closes_later_and_bounces(response):
 
     assert on[1, CHARGING] < 0.02 and on[4, CHARGING] > 0.98  # physics.md 2.5: lift from 1.9 ms on
     assert on[3, VENTING] > 0.98 and on[5, VENTING] < 0.1  # the other seat closes at 3.8 ms
+    assert on[6, CHARGING] > 0.98
     assert off[2, CHARGING] > 0.98 and off[7, CHARGING] < 0.2  # lift falls from 3.9 ms on
+    assert off[5, VENTING] > 0.1
     assert (np.diff(off[:, CHARGING]) > 0.1).any()
 
 
