@@ -11,7 +11,6 @@ from workbench.recording import Recording
 from workbench.rig import load_rig
 from workbench.rig_writing import write_rig
 
-RNG = np.random.default_rng(3)
 ZONE = ("valve_dead_zone.centre_v", "valve_dead_zone.half_width_v", "valve.leak_area_m2")
 STEP_S = 2e-3
 LEAD = 50
@@ -21,10 +20,11 @@ TIME_S = STEP_S * np.arange(1000)
 def tank(command_v, pressure_pa, supply_pa=7e5):
     """A recording of the tank with the noise of its sensors."""
     n = len(command_v)
+    noise = np.random.default_rng(3).standard_normal
     channels = {
         "valve.command_v": np.asarray(command_v, float),
-        "reservoir.pressure_pa": pressure_pa + 500.0 * RNG.standard_normal(n),
-        "supply.pressure_pa": supply_pa + 500.0 * RNG.standard_normal(n),
+        "reservoir.pressure_pa": pressure_pa + 500.0 * noise(n),
+        "supply.pressure_pa": supply_pa + 500.0 * noise(n),
     }
     return Recording("bad", STEP_S, channels)
 
@@ -48,14 +48,15 @@ def sweep(end=7e5, period_s=20.0, supply_pa=7e5):
 def drive(position_m, a_pa=2e5, supply_pa=None, seconds=2.0):
     """A recording of the drive; what is constant has noise."""
     n = round(seconds / STEP_S)
+    noise = np.random.default_rng(3).standard_normal
     channels = {
         "valve.command_v": np.full(n, 5.6),
-        "slide.position_m": position_m + 5e-6 * RNG.standard_normal(n),
-        "chamber_a.pressure_pa": a_pa + 500.0 * RNG.standard_normal(n),
-        "chamber_b.pressure_pa": 1e5 + 500.0 * RNG.standard_normal(n),
+        "slide.position_m": position_m + 5e-6 * noise(n),
+        "chamber_a.pressure_pa": a_pa + 500.0 * noise(n),
+        "chamber_b.pressure_pa": 1e5 + 500.0 * noise(n),
     }
     if supply_pa is not None:
-        channels["supply.pressure_pa"] = supply_pa + 500.0 * RNG.standard_normal(n)
+        channels["supply.pressure_pa"] = supply_pa + 500.0 * noise(n)
     return Recording("bad", STEP_S, channels)
 
 
@@ -97,7 +98,7 @@ BAD = {
     "heat, no push": ("wall-heat", lambda: drive(0.1), "the piston never moves"),
     "heat, no decay": (
         "wall-heat",
-        lambda: drive(np.where(TIME_S < 0.5, 0.1, 0.2)),
+        lambda: drive(np.where(TIME_S < 0.5, 0.2, 0.1), np.where(TIME_S < 0.5, 2e5, 4e5)),
         "is no thermal decay: chamber_a moves by",
     ),
     "volume, no tank": ("dead-volume", lambda: drive(0.29), "the tank is not recorded"),
