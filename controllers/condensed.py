@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache, cached_property
+from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -20,6 +21,42 @@ from linearize.modes import Mode
 
 PRICED = np.array([10.0, 1.0, 1.0, 1.0, 0.1])  # 10 mm, ..., 0.1 V: they have the same price
 BALANCING = np.array([0.0, 0.0, -0.5, 0.5])  # pressures that balance a push, per push and area
+
+
+class Asked(NamedTuple):
+    """What a sample asks of a program of N samples.
+
+    x           state now, shape (4,)
+    force_n     on the slide, all along
+    places_m    where the slide should be, shape (N,)
+    others      what velocity and pressures should be, shape (3,)
+    steady_v    opening that costs nothing
+    last_v      opening of the sample before
+    """
+
+    x: np.ndarray
+    force_n: float
+    places_m: np.ndarray
+    others: np.ndarray
+    steady_v: float
+    last_v: float
+
+    @property
+    def targets(self) -> np.ndarray:
+        """What the stacked states should be, shape (4 N,)."""
+        stacked = np.empty((len(self.places_m), len(STATES)))
+        stacked[:, 0], stacked[:, 1:] = self.places_m, self.others
+        return stacked.ravel()
+
+    @property
+    def row(self) -> np.ndarray:
+        """All of it, with a one for what does not depend on it, shape (N + 11,)."""
+        n = len(self.places_m)
+        row = np.empty(n + 11)
+        row[:4], row[4], row[5] = self.x, self.force_n, 1.0
+        row[6 : 6 + n], row[6 + n : -2] = self.places_m, self.others
+        row[-2], row[-1] = self.steady_v, self.last_v
+        return row
 
 
 @dataclass(frozen=True)
@@ -120,14 +157,35 @@ class Program:
 
     def keeps(self, openings: np.ndarray, unforced: np.ndarray, last_v: float) -> bool:
         """Whether openings, shape (N,), keep all limits; not finite, they do not."""
-        n, (low, high) = self.horizon, self.limits.within
-        at = np.empty(len(low))
+        n = self.horizon
+        at = np.empty((2 + len(STATES)) * n)
         at[:n], moves = openings, at[-n:]
         np.matmul(self.forced, openings, out=at[n:-n])
         at[n:-n] += unforced
         moves[0] = openings[0] - last_v
         np.subtract(openings[1:], openings[:-1], out=moves[1:])
-        return bool(((at >= low) & (at <= high)).all())
+        return self.limits.kept(at)
+
+    def without_limits(self, asked: Asked) -> np.ndarray:
+        """The best openings, the states that they lead to, and their changes, shape (6 N,).
+
+        The same as :meth:`unlimited` finds, in one product.
+        """
+        return self.answer @ asked.row
+
+    @cached_property
+    def answer(self) -> np.ndarray:
+        """Of what :meth:`without_limits` gives to a row of :class:`Asked`, (6 N, N + 11)."""
+        N, n, gain = self.horizon, len(STATES), -2.0 * self.inverse
+        pull = gain @ self.weighed.T  # of the openings to stacked states off their targets
+        by_target = pull.reshape(N, N, n)
+        towards = [-by_target[:, :, 0], -by_target[:, :, 1:].sum(axis=1)]
+        priced = [-self.R * gain.sum(axis=1), -self.S * gain[:, 0]]
+        openings = np.column_stack([pull @ self.reply, *towards, *priced])
+        states, moves = self.forced @ openings, moves_of(N) @ openings
+        states[:, : self.reply.shape[1]] += self.reply
+        moves[0, -1] -= 1.0
+        return np.concatenate([openings, states, moves])
 
     @cached_property
     def inverse(self) -> np.ndarray:
@@ -139,12 +197,11 @@ class Program:
 
         The integral grows into a force: it pushes the prediction and shifts the target pressures.
         """
-        pull = -2.0 * self.inverse[0] @ self.weighed.T
-        shift = np.tile(BALANCING, self.horizon) / area_m2
-        integral = force_n_m_s * pull @ (self.pushed - shift)
-        error = sample_time_s * np.eye(len(STATES))[0]
-        C = np.array([integral, 2.0 * self.S * self.inverse[0, 0]])
-        D = pull @ self.free + integral * error
+        first, n = self.answer[0], len(STATES)
+        shift = BALANCING[1:] / area_m2
+        integral = force_n_m_s * (first[n] + first[-2 - len(shift) : -2] @ shift)
+        error = sample_time_s * np.eye(n)[0]
+        C, D = np.array([integral, first[-1]]), first[:n] + integral * error
         return Law(np.array([[1.0, 0.0], C]), np.array([error, D]), C, D)
 
     def solved(
@@ -167,7 +224,7 @@ class Program:
 
     def prepared(self) -> Program:
         """The same program with its factors at hand, so that the first sample need not wait."""
-        _ = self.general, self.inverse, self.reply, self.priced
+        _ = self.general, self.inverse, self.answer, self.priced
         _ = self.limits.sides, self.limits.within
         return self
 

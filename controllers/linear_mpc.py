@@ -34,7 +34,7 @@ from time import perf_counter
 
 import numpy as np
 
-from controllers.condensed import BALANCING, Program, program_of
+from controllers.condensed import BALANCING, Asked, Program, program_of
 from controllers.margins import Law
 from controllers.motion import PREVIEW
 from controllers.mpc_limits import soft_rows, state_limits
@@ -49,6 +49,7 @@ from workbench.contracts import Command, Estimate
 
 PUSHED = np.array([0.0, 1.0, 1.0, -1.0])  # ways of velocity and pressures as the slide is pushed
 AT_END_V = 1e-9  # from an end of the valve, which a solver meets to rounding
+NO_LIMIT = {"fallback": 0.0, "iterations": 0.0}  # notes of a plan that needs no solver
 ROUNDED = 1e-3  # cost per unit of a slack: multipliers below are rounding of a solver
 
 
@@ -147,39 +148,58 @@ class LinearMpc:
         self, now: Task, reference: np.ndarray, memory: Memory, integral: float
     ) -> tuple[Plan, dict[str, float]]:
         """The new plan; the last one, shifted, where the solver has no answer."""
-        before = memory.plan
-        last_v = before.openings[0] if before else now.opening_v
-        friction_n = self.force_n_m_s * integral
+        before, friction_n = memory.plan, self.force_n_m_s * integral
         place_m = before.place_m if before else now.x[0]
         program = self.programs.heaviest(place_m, now.ahead)
-        program, unforced = self._predicted(program, now, friction_n - now.rise_n, before)
-        targets = self._targets(now, reference, program.horizon, friction_n)
-        g = program.gradient(unforced, targets, now.opening_v, last_v)
-        openings = program.unlimited(g)
-        if program.keeps(openings, unforced, last_v):
-            plan, notes = Plan(openings), {"fallback": 0.0, "iterations": 0.0}
-        else:
-            sides = program.limits.bounds(unforced, last_v)
-            plan, notes = limited_plan(program, g, *sides, before, now.opening_v)
-        middle = len(STATES) * (program.horizon // 2)
-        place_m = float(unforced[middle] + program.forced[middle] @ plan.openings)
-        return Plan(plan.openings, place_m, plan.start), notes
+        asked = Asked(
+            now.x,
+            friction_n - now.rise_n,
+            self._places(now, reference, program.horizon),
+            now.target[1:] + friction_n / self.task.area_m2 * BALANCING[1:],
+            now.opening_v,
+            before.openings[0] if before else now.opening_v,
+        )
+        return self._best(program, asked, now, before)
 
-    def _predicted(
-        self, program: Program, now: Task, force_n: float, before: Plan | None
-    ) -> tuple[Program, np.ndarray]:
-        """The program of the coming samples, and the stacked states under zero openings."""
-        return program, program.unforced(now.x, force_n)
+    def _best(
+        self, program: Program, asked: Asked, now: Task, before: Plan | None
+    ) -> tuple[Plan, dict[str, float]]:
+        """The plan that is best on the mode of the program."""
+        n = program.horizon
+        at = program.without_limits(asked)
+        if program.limits.kept(at):
+            return Plan(at[:n], float(at[n + middle_of(n)])), dict(NO_LIMIT)
+        unforced = program.unforced(asked.x, asked.force_n)
+        g = program.gradient(unforced, asked.targets, asked.steady_v, asked.last_v)
+        return plan_at_limits(program, g, unforced, asked, before)
 
-    def _targets(self, now: Task, reference: np.ndarray, n: int, friction_n: float) -> np.ndarray:
-        """Stacked targets, shape (4 N,): the coming reference as far off as the approach allows."""
-        targets = np.empty((n, len(now.target)))
-        targets[:] = now.target + friction_n / self.task.area_m2 * BALANCING
-        if now.speed_m_s:  # else the place in now.target holds all along
-            limit = self.task.spec.approach_m
-            coming = np.maximum(reference[0, 1 : n + 1], now.x[0] - limit)
-            targets[:, 0] = np.minimum(coming, now.x[0] + limit)
-        return targets.ravel()
+    def _places(self, now: Task, reference: np.ndarray, n: int) -> np.ndarray:
+        """The coming reference as far off as the approach allows, shape (n,)."""
+        if not now.speed_m_s:
+            return np.full(n, now.target[0])
+        limit = self.task.spec.approach_m
+        coming = np.maximum(reference[0, 1 : n + 1], now.x[0] - limit)
+        return np.minimum(coming, now.x[0] + limit)
+
+
+def middle_of(horizon: int) -> int:
+    """Where the place half-way stands among stacked states."""
+    return len(STATES) * (horizon // 2)
+
+
+def plan_at_limits(
+    program: Program, g: np.ndarray, unforced: np.ndarray, asked: Asked, before: Plan | None
+) -> tuple[Plan, dict[str, float]]:
+    """The best plan where the one without limits breaks some, and what is noted of it."""
+    sides = program.limits.bounds(unforced, asked.last_v)
+    plan, notes = limited_plan(program, g, *sides, before, asked.steady_v)
+    return replace(plan, place_m=half_way_m(program, unforced, plan.openings)), notes
+
+
+def half_way_m(program: Program, unforced: np.ndarray, openings: np.ndarray) -> float:
+    """The place half-way under openings (N,)."""
+    middle = middle_of(program.horizon)
+    return float(unforced[middle] + program.forced[middle] @ openings)
 
 
 def limited_plan(

@@ -43,6 +43,11 @@ class Limits:
         moved = np.full(n, self.move_v)
         return np.concatenate([first, low, -moved]), np.concatenate([last, high, moved])
 
+    def kept(self, at: np.ndarray) -> bool:
+        """Whether openings, stacked states and moves (6 N,) are all within; not finite, no."""
+        low, high = self.within
+        return bool(((at >= low) & (at <= high)).all())
+
     def bounds(self, unforced: np.ndarray, last_v: float) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper side of the rows of a program: openings, what is soft twice, slacks.
 

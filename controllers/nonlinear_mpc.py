@@ -16,8 +16,15 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from controllers.condensed import Program
-from controllers.linear_mpc import LinearMpc, Plan, linear_mpc
+from controllers.condensed import Asked, Program
+from controllers.linear_mpc import (
+    NO_LIMIT,
+    LinearMpc,
+    Plan,
+    half_way_m,
+    linear_mpc,
+    plan_at_limits,
+)
 from controllers.mpc_spec import MpcSpec
 from controllers.positioning import STATES, Task
 from controllers.rollout import Rollout, sliding_advance
@@ -30,13 +37,24 @@ class NonlinearMpc(LinearMpc):
 
     rollout: Rollout
 
+    def _best(
+        self, program: Program, asked: Asked, now: Task, before: Plan | None
+    ) -> tuple[Plan, dict[str, float]]:
+        program, unforced = self._predicted(program, asked, now, before)
+        g = program.gradient(unforced, asked.targets, asked.steady_v, asked.last_v)
+        openings = program.unlimited(g)
+        if program.keeps(openings, unforced, asked.last_v):
+            return Plan(openings, half_way_m(program, unforced, openings)), dict(NO_LIMIT)
+        return plan_at_limits(program, g, unforced, asked, before)
+
     def _predicted(
-        self, program: Program, now: Task, force_n: float, before: Plan | None
+        self, program: Program, asked: Asked, now: Task, before: Plan | None
     ) -> tuple[Program, np.ndarray]:
+        """The program along the last plan, and its stacked states under zero openings."""
         shifted = before.shifted().openings if before else np.full(program.horizon, now.opening_v)
         openings = np.clip(shifted, *program.limits.openings)
         side = 1.0 if now.ahead >= 0.5 else -1.0  # a share of friction would leave the slide stuck
-        return along(program, self.rollout, now.x, openings, [side, force_n])
+        return along(program, self.rollout, asked.x, openings, [side, asked.force_n])
 
 
 def along(

@@ -83,7 +83,7 @@ class Daqp:
         if not np.isfinite(g).all():
             return None
         first, rest = program.order
-        lower, upper = (np.nan_to_num(side, posinf=FAR, neginf=-FAR) for side in (low, high))
+        lower, upper = np.maximum(low, -FAR), np.minimum(high, FAR)
         order = np.concatenate([first, rest])
         z, _, flag, info = daqp.solve(
             program.hessian,

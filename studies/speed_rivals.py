@@ -97,10 +97,10 @@ class WholePlantMpc(NonlinearMpc):
 
     state: np.ndarray
 
-    def _predicted(self, program, now, force_n, before):
+    def _predicted(self, program, asked, now, before):
         steady = np.full(program.horizon, now.opening_v)
         openings = before.shifted().openings if before else steady
-        return along(program, self.rollout, self.state, openings, [0.0, force_n])
+        return along(program, self.rollout, self.state, openings, [0.0, asked.force_n])
 
     def told(self, state: np.ndarray) -> WholePlantMpc:
         """The same with another state."""

@@ -96,31 +96,6 @@ def test_each_soft_limit_has_the_solution_of_a_readable_oracle(hybrid, limit, so
     assert np.abs(oracle(program, spec, np.array(x), targets, limit) - wanted).max() > 0.01
 
 
-@pytest.mark.parametrize(("horizon", "spread"), [(1, 4.0), (20, 1.0)])
-def test_openings_keep_the_limits_where_they_keep_the_rows_of_the_program_without_slack(
-    hybrid, horizon, spread
-):
-    """Each kind of limit broken by itself, and random openings around all of them."""
-    spec = MpcSpec(rate_v_s=200.0, horizon=horizon)
-    program = linear_mpc(hybrid, spec).programs.forward[1]
-    n, rng, answers = program.horizon, np.random.default_rng(7), []
-    states = REST + [0.1, 1.5, 1.3e5, 1.3e5] * rng.uniform(-1.0, 1.0, (200, 4))
-    steps = rng.normal(0.0, rng.choice([0.02, 0.2], (200, 1)), (200, n))
-    for x, step in zip(states, spread * steps, strict=True):
-        openings, unforced = 0.1 + np.cumsum(step), program.unforced(x, 0.0)
-        low, high = program.limits.bounds(unforced, 0.1)
-        at = program.rows @ np.concatenate([openings, np.zeros(5)])
-        answers.append(program.keeps(openings, unforced, 0.1))
-
-        assert answers[-1] == bool((at >= low).all() and (at <= high).all())
-    calm = np.zeros(n), program.unforced(REST, 0.0)
-    assert 10 < sum(answers) < 190 and program.keeps(*calm, 0.0)
-    assert not program.keeps(*calm, 0.5)
-    largest = program.limits.openings[1]
-    assert not program.keeps(np.full(n, largest + 0.1), calm[1], largest)
-    assert not program.keeps(np.full(n, np.nan), calm[1], 0.0)
-
-
 class NextToTheEnd:
     """A solver that opens the valve as far as it goes, but for rounding."""
 
