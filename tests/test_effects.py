@@ -5,6 +5,7 @@ from math import isfinite
 import casadi as ca
 import numpy as np
 import pytest
+from conftest import PLANT_MODELS
 
 from workbench.effects import CATALOGUE, ClockDrift, CommandDelay, PacketPause, SensorDelay
 from workbench.effects.timing import Timing, sent_at_s
@@ -24,6 +25,10 @@ DIMENSIONLESS = {
     "turns",
     "weight",
 }
+QUICKLY = [
+    pytest.param(plant, id=name, marks=[pytest.mark.slow] * (name == "crr_leg"))
+    for name, plant in PLANT_MODELS.items()
+]  # the leg has no effect that no other plant has, and takes a minute and a half
 SMALL_SHARE = 1e-3  # of the typical strength: the secant of a kinked cause
 
 
@@ -125,6 +130,7 @@ def test_the_sizes_that_a_scan_tries_lie_within_the_bounds(plant):
                 assert known.lower <= value <= known.upper, candidate.name
 
 
+@pytest.mark.parametrize("plant", QUICKLY, indirect=True)
 def test_an_effect_at_null_is_the_same_as_no_effect(plant, conditions):
     at = conditions(plant)
     for effect in plant.effects:
@@ -138,6 +144,7 @@ def test_an_effect_at_null_is_the_same_as_no_effect(plant, conditions):
             np.testing.assert_array_equal(present[name], values, err_msg=f"{effect.name}: {name}")
 
 
+@pytest.mark.parametrize("plant", QUICKLY, indirect=True)
 def test_a_strength_at_null_can_still_be_felt_by_the_derivative(plant, conditions):
     """Where the law has a kink at null, by a short secant instead."""
     at = conditions(plant, n=1000, spread=2.0)
