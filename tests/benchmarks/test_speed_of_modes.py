@@ -55,7 +55,14 @@ def leg_regimes():
 
 @pytest.mark.benchmark(timer=time.process_time)
 @pytest.mark.parametrize(
-    "make", [servo_drive_modes, gearbox_many, rig_modes, leg_modes, leg_regimes]
+    "make",
+    [
+        servo_drive_modes,
+        gearbox_many,
+        rig_modes,
+        leg_modes,
+        pytest.param(leg_regimes, marks=pytest.mark.slow),  # half a minute on a slow machine
+    ],
 )
 def test_a_hundred_modes(benchmark, make):
     hybrid = benchmark.pedantic(make, rounds=3)
