@@ -50,7 +50,7 @@ class Asked(NamedTuple):
 
     @property
     def row(self) -> np.ndarray:
-        """All of it, with a one for what does not depend on it, shape (N + 11,)."""
+        """All of it in this order, and behind the force a one for the drift, shape (N + 11,)."""
         n = len(self.places_m)
         row = np.empty(n + 11)
         row[:4], row[4], row[5] = self.x, self.force_n, 1.0
