@@ -100,6 +100,22 @@ def test_a_row_that_was_left_behind_says_at_which_stage(problem, followed):
     assert all(r.reasons != ("not among the best of the scan",) for r in rows if r.drop_train <= 0)
 
 
+def test_what_an_earlier_base_led_to_stays_where_it_is_lower(problem, followed, sound):
+    """And counts from the base there is now; a refit that ended higher there is forgotten."""
+    cost = 0.9 * sound.fit.cost
+    lower = replace(sound, fit=replace(sound.fit, cost=cost), drop_train=0.01)
+    other = next(r for r in followed.refits if r.candidate != sound.candidate)
+    higher = replace(other, fit=replace(other.fit, cost=1.1 * other.fit.cost))
+
+    again = follow(problem, None, silent, [lower, higher])
+    found = {r.candidate.name: r for r in again.refits}
+
+    assert found["coulomb_friction"].fit.cost == cost
+    drop = (problem.base.cost - cost) / problem.misfit
+    assert found["coulomb_friction"].drop_train == pytest.approx(drop)
+    assert found[other.candidate.name].fit.cost < higher.fit.cost
+
+
 def test_errors_far_above_the_noise_are_spoken_of_where_nothing_is_named():
     """A force that no effect of the bench can give, 50 times the sensor's noise."""
     t = TRAIN.time_s

@@ -141,7 +141,7 @@ def _asked(problem: Problem, where: Where | None, progress: Progress) -> _Asked:
     better = improved_base(problem, [each.fit for each in followed.refits])
     if better:
         progress("the prior fit is improved by what the refits found: once more")
-        problem, followed = better, follow(better, where, progress)
+        problem, followed = better, follow(better, where, progress, followed.refits)
     profiles = followed.profiles
     ranking = ranked(problem, profiles, followed.refits, followed.moved, followed.begun)
     ranking = with_pairs(problem, ranking, profiles, progress)

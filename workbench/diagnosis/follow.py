@@ -18,7 +18,14 @@ from workbench.diagnosis.judge import (
     predicts,
     reasons_against,
 )
-from workbench.diagnosis.refit import Refit, refit, refit_from, refit_shaken, refit_shift
+from workbench.diagnosis.refit import (
+    Refit,
+    counted_from,
+    refit,
+    refit_from,
+    refit_shaken,
+    refit_shift,
+)
 from workbench.diagnosis.result import Where
 from workbench.diagnosis.rough import Rough, rough_fit
 from workbench.diagnosis.scan import Profile, scan_catalogue, scan_from_priors
@@ -50,8 +57,14 @@ class Followed:
     moved: list[Shift]
 
 
-def follow(problem: Problem, where: Where | None, progress: Progress) -> Followed:
-    """Scan the catalogue and refit the best few."""
+def follow(
+    problem: Problem, where: Where | None, progress: Progress, earlier: Sequence[Refit] = ()
+) -> Followed:
+    """Scan the catalogue and refit the best few.
+
+    Refits from an ``earlier`` base on the same windows stay where they are lower: from another base
+    the same candidate may end in a worse valley.
+    """
     progress("scan of the catalogue")
     profiles = scan_catalogue(problem)
     looked = _shortlist(profiles, where, scan_from_priors(problem))
@@ -70,6 +83,7 @@ def follow(problem: Problem, where: Where | None, progress: Progress) -> Followe
     for shift in [each for each in moved if each.leaves and each.drop > least][:SHIFTS_REFITTED]:
         progress(f"refit with {shift.name} free")
         refits.append(refit_shift(problem, shift, _best_share(refits)))
+    refits = _lowest_of_each(problem, refits, earlier)
     progress("the best once more from beside where they ended")
     refits = _best_first(problem, _shaken(problem, refits))
     led = None
@@ -92,6 +106,18 @@ def _to_refit(begun: Sequence[Rough], where: Where | None) -> list[Rough]:
 
 def _acts_there(begun: Rough, where: Where | None) -> bool:
     return where is not None and acts_in(begun.profile.candidate, where.balance)
+
+
+def _lowest_of_each(
+    problem: Problem, refits: Sequence[Refit], earlier: Sequence[Refit]
+) -> list[Refit]:
+    """The lowest refit of every candidate, all measured from the base there is now."""
+    found = {each.candidate.name: each for each in refits}
+    for each in earlier:
+        name = each.candidate.name
+        if name not in found or each.fit.cost < found[name].fit.cost:
+            found[name] = counted_from(problem.base, problem.base_validation, each)
+    return [*found.values()]
 
 
 def _shaken(problem: Problem, refits: Sequence[Refit]) -> list[Refit]:
