@@ -39,11 +39,12 @@ def astray(fit, deviations):
 
 
 def test_a_fit_whose_parameters_went_astray_begins_again_at_their_priors(fitted):
+    """It comes as low as one that began there, or lower: that one may rest in a shallow dent."""
     stuck = astray(fitted, 4.0 * FAR)
     found = pulled_in(stuck, ITERATIONS)
 
     assert stuck.cost > 2.0 * fitted.cost
-    assert found.cost == pytest.approx(fitted.cost, rel=1e-3)
+    assert found.cost < 1.001 * fitted.cost
 
 
 def test_what_was_added_keeps_its_size_where_the_others_go_back(fitted):
