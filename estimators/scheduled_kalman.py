@@ -11,11 +11,10 @@ as in Rugh and Shamma 2000, "Research on gain scheduling".
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
-import casadi as ca
 import numpy as np
 
 from estimators.stochastic_plant import LIKELY
@@ -24,6 +23,7 @@ from linearize.hybrid_simulation import SampledHybrid, sampled_hybrid
 from linearize.modes import HybridModel, hybrid_modes
 from linearize.shift_modes import resting_modes
 from linearize.standard import STANDARD_MODES
+from workbench.called import prepared
 from workbench.contracts import Estimate
 from workbench.filtering import consistent_start, correct, predict
 from workbench.plant import Plant
@@ -97,7 +97,7 @@ class ScheduledKalman:
         F = step[:, :n] * size / size[:, None]
         _, P = predict(x / size, P + Q / 2, F, Q / 2)
         C, offset = self._seen[k]
-        behind = self._behind(later, command).full().ravel()
+        behind = self._sent(later, command)
         e = (measurement - C @ np.concatenate([later, behind]) - offset) / self._noise
         H = C[:, :n] * size / self._noise[:, None]
         told = {"mode": float(k)} | self._likely(e, H @ P @ H.T + np.eye(len(e)))
@@ -124,7 +124,11 @@ class ScheduledKalman:
         return self._active(self._row(x, command))
 
     def _row(self, x: np.ndarray, command: np.ndarray) -> np.ndarray:
-        return np.concatenate([x, self._behind(x, command).full().ravel(), [1.0]])
+        return np.concatenate([x, self._sent(x, command), [1.0]])
+
+    def _sent(self, x: np.ndarray, command: np.ndarray) -> np.ndarray:
+        """Commands of the modes, behind the dead zone."""
+        return self._behind(*(np.ascontiguousarray(each, dtype=float) for each in (x, command)))[0]
 
     def _active(self, z: np.ndarray) -> int:
         if not self.mode:
@@ -151,10 +155,10 @@ class ScheduledKalman:
         return sampled_hybrid(hybrid, self.sample_time_s)
 
     @cached_property
-    def _behind(self) -> ca.Function:
+    def _behind(self) -> Callable[..., list[np.ndarray]]:
         """(x, u as sent) -> u of the modes, behind the dead zone."""
         model = self.sampled.hybrid.model
-        return replace(model, plant=self.plant.lean()).quantities(*model.commands)
+        return prepared(replace(model, plant=self.plant.lean()).quantities(*model.commands))
 
     @cached_property
     def _seen(self) -> list[tuple[np.ndarray, np.ndarray]]:

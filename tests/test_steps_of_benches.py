@@ -20,6 +20,7 @@ from workbench.rig import default_rig
 
 STEP = 'rise_time = "1 s"\novershoot = "5 %"\nswitches = 500\nair = "9 g"\n'
 SIDES = np.tile([1.0, -1.0], 5)
+QUICKLY = [n if n != "crr_leg" else pytest.param(n, marks=pytest.mark.slow) for n in BENCHES]
 LENGTHS = {"crr_rig": "1 mm", "crr_arm": "1 deg", "soft_joint": "0.1 bar"}
 
 
@@ -36,7 +37,7 @@ def test_a_step_is_asked_for_rise_overshoot_final_error_cycle_and_switches(name)
         assert list(line.scenarios) == ([*tasks_of(rig.plant)] if everywhere else steps)
 
 
-@pytest.mark.parametrize("name", BENCHES)
+@pytest.mark.parametrize("name", QUICKLY)
 def test_every_line_of_a_bench_is_a_figure_of_its_runs(name):
     """One task of each kind, under the design of the bench."""
     plant = PLANTS[name]()
