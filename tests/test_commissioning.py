@@ -4,6 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from driven_gearbox import DRIVEN
 
 from studies.checking import drawn
 from studies.commissioning import claims, commissioned, played, reached_table, recorded
@@ -51,6 +52,13 @@ def test_whole_shifts_and_pulses_that_end_before_the_piston_arrives_are_played()
         assert min(stood[one_valve]) < 20 < 50 < max(stood[one_valve])
 
 
+def test_most_pulses_of_either_valve_are_as_short_as_a_brake():
+    commands = played().rows(COMMANDS)
+    lasts = [np.diff(np.flatnonzero(np.diff(row, prepend=0.0)))[::2] for row in commands]
+
+    assert all(np.mean(each < 20) > 0.5 and np.sum(each < 10) >= 3 for each in lasts)
+
+
 def test_every_actuator_is_played_the_same_with_noise_of_its_own():
     first, second, other = recorded(OTHER, 0), recorded(OTHER, 1), recorded(gearbox(), 0)
     exact = simulate(OTHER.lean(), played())
@@ -94,7 +102,7 @@ def test_one_recording_halves_what_is_wrong_of_supply_flows_dead_volume_and_dete
 def test_short_windows_lead_out_of_a_valley_where_every_impact_comes_at_the_wrong_instant():
     """A drawn actuator on which a fit from the priors ends at seven times the noise."""
     truth = drawn(default_rig(gearbox()), np.random.default_rng(8))
-    recording = recorded(truth, 7)
+    recording = recorded(truth, 7, DRIVEN)
     from_priors = pose(default_rig(gearbox()), [recording])
     found = better_from_short_windows(from_priors, [recording])
 

@@ -5,6 +5,7 @@ from math import nan
 
 import numpy as np
 import pytest
+from driven_gearbox import DRIVEN
 from test_fitting import NOISE, sines
 
 from studies.commissioning import recorded
@@ -30,7 +31,7 @@ SPRING = gearbox().candidates["spring_force"]
 @pytest.fixture(scope="module")
 def shifted():
     """A second of shifts of the default gearbox; valves switch at starts of windows."""
-    whole = recorded(gearbox(), 0)
+    whole = recorded(gearbox(), 0, DRIVEN)
     return whole.part(0, round(LASTS_S / whole.sample_time_s))
 
 
@@ -161,6 +162,6 @@ def test_a_fit_of_a_drawn_gearbox_comes_to_its_noise():
     Its port stays more than two prior deviations off: the recording does not tell it.
     """
     truth = _truth(16)
-    found = fit(default_rig(gearbox()), [recorded(truth, 16)])
+    found = fit(default_rig(gearbox()), [recorded(truth, 16, DRIVEN)])
 
     assert loudest(found.fit) < 1.1
