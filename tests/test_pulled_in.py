@@ -13,6 +13,7 @@ from workbench.fitting.gauss_newton import fit_windows
 from workbench.fitting.linearised import Point
 from workbench.fitting.problem import ITERATIONS
 from workbench.fitting.pulled_in import FAR, pulled_in
+from workbench.fitting.resized import resized
 from workbench.fitting.unknowns import WIDE, nominal_unknowns
 
 ADDED = "friction.viscous_n_s_m"  # stands for what was added: it is given no prior
@@ -23,7 +24,8 @@ def fitted(windows):  # noqa: F811
     unknowns = nominal_unknowns(windows.plant)
     precision = np.where([name == ADDED for name in unknowns.names], WIDE**-2, 1.0)
     unknowns = replace(unknowns, precision=precision)
-    return fit_windows(windows, unknowns, iterations=ITERATIONS)
+    # from the priors alone it rests in a dent, 0.2 % above the valley's floor
+    return resized(fit_windows(windows, unknowns, iterations=ITERATIONS), [ADDED], ITERATIONS)
 
 
 def left_at(fit, t):
@@ -39,12 +41,11 @@ def astray(fit, deviations):
 
 
 def test_a_fit_whose_parameters_went_astray_begins_again_at_their_priors(fitted):
-    """It comes as low as one that began there, or lower: that one may rest in a shallow dent."""
     stuck = astray(fitted, 4.0 * FAR)
     found = pulled_in(stuck, ITERATIONS)
 
     assert stuck.cost > 2.0 * fitted.cost
-    assert found.cost < 1.001 * fitted.cost
+    assert found.cost == pytest.approx(fitted.cost, rel=1e-3)
 
 
 def test_what_was_added_keeps_its_size_where_the_others_go_back(fitted):
