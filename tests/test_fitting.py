@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from studies.text_of_results import errors_text, windows_text
+from workbench.fitting.costs import best_of_each, points_costs
 from workbench.fitting.errors import Place, plain_ratio, signal_errors
-from workbench.fitting.gauss_newton import best_of_each, beyond_noise, fit_windows, points_costs
+from workbench.fitting.gauss_newton import beyond_noise, fit_windows
 from workbench.fitting.linearised import Point
 from workbench.fitting.noise import measured_noise
 from workbench.fitting.problem import fuller, staged

@@ -16,15 +16,10 @@ from workbench.diagnosis.result import Size
 from workbench.diagnosis.rough import Rough, windows_for
 from workbench.diagnosis.shifts import Shift
 from workbench.fitting.continued import continued
+from workbench.fitting.costs import best_of_each, points_costs
 from workbench.fitting.error_model import OUTLYING
 from workbench.fitting.errors import plain_ratio
-from workbench.fitting.gauss_newton import (
-    Fit,
-    best_of_each,
-    beyond_noise,
-    fit_windows,
-    points_costs,
-)
+from workbench.fitting.gauss_newton import Fit, beyond_noise, fit_windows
 from workbench.fitting.linearised import Point
 from workbench.fitting.posterior import posterior_deviation
 from workbench.fitting.problem import Problem, misfit

@@ -19,7 +19,8 @@ import numpy as np
 from workbench.candidate import Candidate
 from workbench.diagnosis.blind_starts import blind_starts, settled
 from workbench.diagnosis.scan import Profile, Trial
-from workbench.fitting.gauss_newton import Fit, fit_windows, follow, points_costs
+from workbench.fitting.costs import points_costs
+from workbench.fitting.gauss_newton import Fit, fit_windows, follow
 from workbench.fitting.linearised import Point, borrowed
 from workbench.fitting.problem import Problem, staged
 from workbench.fitting.start_states import carried

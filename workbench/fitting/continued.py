@@ -15,13 +15,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from workbench.fitting.gauss_newton import (
-    Fit,
-    best_of_each,
-    beyond_noise,
-    fit_windows,
-    points_costs,
-)
+from workbench.fitting.costs import best_of_each, points_costs
+from workbench.fitting.gauss_newton import Fit, beyond_noise, fit_windows
 from workbench.fitting.linearised import Point, plant_at
 from workbench.fitting.windows import Windows
 

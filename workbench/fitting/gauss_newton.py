@@ -10,17 +10,25 @@ Source: diagnosis.md 1.2 and 1.4.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from itertools import cycle
 
 import numpy as np
 
+from workbench.fitting.costs import (
+    Cost,
+    Costs,
+    best_of_each,
+    costs_of_best_starts,
+    points_costs,
+)
 from workbench.fitting.linearised import (
+    FINE_STEP,
+    PARAMETER_STEP,
     Linearised,
     Point,
     linearise,
     normal_equations,
-    plant_at,
     secant,
     seen_at,
 )
@@ -100,25 +108,31 @@ def fit_windows(
     beyond noise, the next uses the same derivatives, corrected by what the step showed: they are
     the dear part.  Parts of the whole cost would be no measure: most of it is noise that no fit
     takes away, and effects that differ by less would be compared half fitted.
+
+    Derivatives are differences over wide steps, which see across break-aways and impacts, and in
+    turn over fine ones: in a valley that is narrower than the wide ones these lead nowhere.  Only
+    where neither brings anything has a fit converged.
+
     ``start`` is a point, or what it costs where it was run already.  ``at`` are derivatives to
     begin with, taken near by, with the residual of the start.
     """
     start = start or Point(unknowns.scaled(windows.plant.values), windows.start)
     now = start if isinstance(start, Cost) else points_costs(windows, unknowns, [start]).best
-    fresh, converged, stale = False, False, at is None
+    widths = (PARAMETER_STEP, FINE_STEP) if len(unknowns) else (PARAMETER_STEP,)
+    turn, idle, fresh, stale = cycle(widths), 0, False, at is None
     for _ in range(iterations):
         if stale or at is None:
-            at, fresh = linearise(windows, unknowns, now.point, now.residual), True
+            at, fresh = linearise(windows, unknowns, now.point, now.residual, next(turn)), True
         now, fall = _advanced(windows, unknowns, at, now)
-        converged = fresh and fall < CONVERGED
-        if converged:
+        idle = idle + fresh if fall < CONVERGED else 0
+        if idle == len(widths):
             break
         stale, fresh = fall < AGAIN, False
         if not stale:
             at = secant(windows, at, now.point, now.residual)
     at = at or linearise(windows, unknowns, now.point, now.residual)
     at = seen_at(windows, at, now.point, now.residual)
-    return Fit(windows, unknowns, now.point, now.chi2, now.cost, converged, at)
+    return Fit(windows, unknowns, now.point, now.chi2, now.cost, idle == len(widths), at)
 
 
 def follow(
@@ -158,14 +172,11 @@ def _stepped(windows: Windows, unknowns: Unknowns, at: Linearised, now: Cost) ->
     Where start states alone move, every window takes the step that suits it best.
     """
     steps = _damped_steps(at, unknowns)
-    full, *others = (_after(windows, unknowns, now.point, step) for step in steps)
-    first = points_costs(windows, unknowns, [full]).best
-    if not len(unknowns):
-        first = best_of_each((now, first))
+    first = _costs_after(windows, unknowns, now, steps[:1]).best
     promised = now.cost - _promised(at, unknowns, steps[0])
     if now.cost - first.cost > HALF * promised > 0:
         return first
-    damped = points_costs(windows, unknowns, others)
+    damped = _costs_after(windows, unknowns, now, steps[1:])
     if not len(unknowns):
         return best_of_each((first, *damped.rows))
     best = min((first, damped.best), key=lambda each: each.cost)
@@ -174,8 +185,7 @@ def _stepped(windows: Windows, unknowns: Unknowns, at: Linearised, now: Cost) ->
     worse = first.by_window > now.by_window
     if not worse.any() or worse.all():
         return best
-    left = [_after(windows, unknowns, now.point, s) for s in _damped_steps(at, unknowns, ~worse)]
-    again = points_costs(windows, unknowns, left).best
+    again = _costs_after(windows, unknowns, now, _damped_steps(at, unknowns, ~worse)).best
     return min(best, again, key=lambda each: each.cost)
 
 
@@ -189,6 +199,15 @@ def beyond_noise(squares: float, windows: Windows) -> float:
 
 
 Step = tuple[np.ndarray, np.ndarray]  # of the scaled unknowns, and of the scaled start states
+
+
+def _costs_after(windows: Windows, unknowns: Unknowns, now: Cost, steps: list[Step]) -> Costs:
+    """What steps cost; each window moves its start states or keeps them, as suits it better."""
+    moved = [_after(windows, unknowns, now.point, step) for step in steps]
+    if not len(unknowns):  # kept is where it stands, and has been run
+        rows = points_costs(windows, unknowns, moved).rows
+        return Costs(tuple(best_of_each((now, each)) for each in rows))
+    return costs_of_best_starts(windows, unknowns, moved, now.point.starts)
 
 
 def _after(windows: Windows, unknowns: Unknowns, point: Point, step: Step) -> Point:
@@ -235,61 +254,3 @@ def beside(fit: Fit, dt: np.ndarray) -> Point:
     """The point a step (n_p,) of the scaled unknowns away, start states as the linear model has."""
     step = (dt, _starts_with(fit.derivatives, dt))
     return _after(fit.windows, fit.unknowns, fit.point, step)
-
-
-@dataclass(frozen=True)
-class Cost:
-    """What a point costs: squared residuals, and with priors.
-
-    by_window   share of each window, (n_windows,)
-    residual    weighted, (n_y, n_windows, L)
-    """
-
-    point: Point
-    chi2: float
-    cost: float
-    by_window: np.ndarray
-    residual: np.ndarray
-
-
-@dataclass(frozen=True)
-class Costs:
-    """Costs of a batch of points."""
-
-    rows: tuple[Cost, ...]
-
-    @property
-    def best(self) -> Cost:
-        """The cheapest."""
-        return min(self.rows, key=lambda each: each.cost)
-
-
-def best_of_each(costs: Sequence[Cost]) -> Cost:
-    """The start states of each window from where they cost least.
-
-    ``costs`` belong to points that differ in their start states alone: windows share no others.
-    """
-    chosen = np.argmin([each.by_window for each in costs], axis=0)
-    starts, residual = costs[0].point.starts.copy(), costs[0].residual.copy()
-    by_window = costs[0].by_window.copy()
-    for k, each in enumerate(costs):
-        own = chosen == k
-        starts[:, own], residual[:, own] = each.point.starts[:, own], each.residual[:, own]
-        by_window[own] = each.by_window[own]
-    chi2, prior = float(np.sum(residual**2)), costs[0].cost - float(costs[0].by_window.sum())
-    point = replace(costs[0].point, starts=starts)
-    return Cost(point, chi2, float(by_window.sum()) + prior, by_window, residual)
-
-
-def points_costs(windows: Windows, unknowns: Unknowns, points: list[Point]) -> Costs:
-    """Costs of points, all run in one batch."""
-    plants = [plant_at(windows, unknowns, point.t) for point in points]
-    r = windows.residuals(plants, np.array([point.starts for point in points]))
-    rows = []
-    for point, residual in zip(points, r, strict=True):
-        squares = np.sum(residual**2, axis=(0, 2))
-        away = (point.starts - windows.start) / windows.start_deviation
-        own = squares + np.sum(away**2, axis=0)
-        prior = float(np.sum(unknowns.precision * point.t**2))
-        rows.append(Cost(point, float(squares.sum()), float(own.sum()) + prior, own, residual))
-    return Costs(tuple(rows))

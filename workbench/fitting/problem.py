@@ -10,7 +10,8 @@ import numpy as np
 from workbench.candidate import Candidate
 from workbench.effect import Effect
 from workbench.fitting.continued import continued
-from workbench.fitting.gauss_newton import Fit, beyond_noise, fit_windows, points_costs
+from workbench.fitting.costs import points_costs
+from workbench.fitting.gauss_newton import Fit, beyond_noise, fit_windows
 from workbench.fitting.linearised import Linearised, Point, plant_at
 from workbench.fitting.noise import measured_noise
 from workbench.fitting.own_errors import ITERATIONS, consistent, weighed_anew

@@ -6,10 +6,10 @@ So sets of parameters are drawn from what the fit believes of them,
 
     t + s H^(-1/2) z,    z ~ N(0, I),
 
-with H the curvature of the cost and s one deviation, then three; the start states of all windows
-follow each as the linear model has them.  The cheapest is followed with the derivatives that are
-known, and where that leads lower the fit goes on from there with its own.  Seeds are fixed: the
-same recording gives the same fit.
+with H the curvature of the cost and s one deviation, then three; the start states of each window
+follow as the linear model has them, or stay where that suits it better.  The cheapest is followed
+with the derivatives that are known, and where that leads lower the fit goes on from there with its
+own.  Seeds are fixed: the same recording gives the same fit.
 
 Source: basin hopping, Wales and Doye 1997, "Global optimization by basin-hopping"; the steps are
 those of the Laplace approximation.
@@ -19,13 +19,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from workbench.fitting.costs import costs_of_best_starts
 from workbench.fitting.gauss_newton import (
     Fit,
     beside,
     beyond_noise,
     fit_windows,
     follow,
-    points_costs,
 )
 from workbench.fitting.linearised import Point, normal_equations, seen_at
 from workbench.fitting.window_length import moves
@@ -61,7 +61,7 @@ def shaken(fit: Fit, iterations: int) -> Fit:
 def _lower(fit: Fit, points: list[Point], iterations: int) -> Fit:
     """The fit, or the one to which the cheapest of the points leads if it is lower."""
     windows, unknowns = fit.windows, fit.unknowns
-    start = points_costs(windows, unknowns, points).best
+    start = costs_of_best_starts(windows, unknowns, points, fit.point.starts).best
     at = seen_at(windows, fit.derivatives, start.point, start.residual)
     tried = follow(windows, unknowns, start, at, FOLLOWED)
     if not tried.cost < fit.cost - WORTH_IT * beyond_noise(fit.cost, windows):

@@ -4,7 +4,8 @@ Within a window errors pile up, and where parts meet or break away the cost is r
 priors may end in a valley in which every long window runs past its impacts at the wrong instants.
 Windows of a tenth of the length start anew before that happens, and their cost is smooth; from
 where they lead, windows of about twice the length know more of the parameters.  In two steps, a
-tenth and a third, some gearbox actuators were left well above the noise.
+tenth and a third, some gearbox actuators were left well above the noise.  The long windows are
+weighed by what they leave from there, not by what the fit left that is to be bettered.
 
 Source: multiple shooting, Bock 1983, "Recent advances in parameter identification techniques for
 ODE", whose short intervals widen the valley of the right parameters.
@@ -16,10 +17,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from workbench.fitting.continued import continued
 from workbench.fitting.errors import at_noise
-from workbench.fitting.gauss_newton import fit_windows
-from workbench.fitting.linearised import Point
-from workbench.fitting.own_errors import ITERATIONS, better_of, by_own_errors, weighed_anew
+from workbench.fitting.own_errors import ITERATIONS, better_of, by_own_errors
 from workbench.fitting.problem import Problem, fitted_twice
 from workbench.fitting.window_length import FEWEST_SAMPLES, moves
 from workbench.fitting.windows import cut_windows
@@ -39,9 +39,8 @@ def better_from_short_windows(problem: Problem, train: Sequence[Recording]) -> P
     if at_noise(base) or not moves(plant) or not len(base.unknowns) or tenth < FEWEST_SAMPLES:
         return problem
     t = _of_short_windows(problem, train)
-    windows = base.windows
-    tried = fit_windows(windows, base.unknowns, Point(t, windows.start), ITERATIONS)
-    better = better_of(base, by_own_errors(weighed_anew(tried)))
+    tried = fitted_twice(base.windows, base.unknowns, t)
+    better = better_of(base, by_own_errors(continued(tried, ITERATIONS)))
     return problem if better is base else problem.with_base(better)
 
 
@@ -53,5 +52,5 @@ def _of_short_windows(problem: Problem, train: Sequence[Recording]) -> np.ndarra
     t = problem.at_priors
     for share in SHARES:
         windows = cut_windows(long.plant, train, noise, share * length_s, round(len(long) / share))
-        t = fitted_twice(windows, unknowns, t).point.t
+        t = continued(fitted_twice(windows, unknowns, t), ITERATIONS).point.t
     return t

@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from workbench.fitting.gauss_newton import Fit, best_of_each, fit_windows, points_costs
+from workbench.fitting.costs import best_of_each, points_costs
+from workbench.fitting.gauss_newton import Fit, fit_windows
 from workbench.fitting.linearised import Point, seen_at
 from workbench.fitting.unknowns import Unknowns
 from workbench.fitting.windows import Windows
