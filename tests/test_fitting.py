@@ -9,7 +9,7 @@ from studies.text_of_results import errors_text, windows_text
 from workbench.fitting.costs import best_of_each, points_costs
 from workbench.fitting.errors import Place, plain_ratio, signal_errors
 from workbench.fitting.gauss_newton import beyond_noise, fit_windows
-from workbench.fitting.linearised import FINE_STEP, PARAMETER_STEP, Point, linearise
+from workbench.fitting.linearised import Point
 from workbench.fitting.noise import measured_noise
 from workbench.fitting.problem import fuller, staged
 from workbench.fitting.start_states import refit_starts
@@ -172,24 +172,6 @@ def test_a_fit_that_has_converged_gains_no_more_from_where_it_ended(plant, wrong
 
     assert found.converged
     assert found.cost - again.cost < 0.01 * beyond_noise(found.cost, windows)
-
-
-def test_derivatives_over_wide_and_over_fine_steps_bring_no_more_where_a_fit_has_converged(
-    plant, recording, monkeypatch
-):
-    taken = []
-
-    def noted(windows, unknowns, point, residual, step):
-        taken.append(step)
-        return linearise(windows, unknowns, point, residual, step)
-
-    monkeypatch.setattr("workbench.fitting.gauss_newton.linearise", noted)
-    windows = cut_windows(plant, [recording], NOISE)
-    off = plant.with_values({"slide.mass_kg": 1.1 * plant.values["slide.mass_kg"]})
-    found = fit_windows(windows.with_plant(off), nominal_unknowns(off, {}, {}), iterations=40)
-
-    assert found.converged
-    assert set(taken[-2:]) == {PARAMETER_STEP, FINE_STEP}
 
 
 def test_a_fit_that_is_cut_short_does_not_say_that_it_has_converged(plant, recording):

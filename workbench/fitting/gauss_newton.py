@@ -11,7 +11,6 @@ Source: diagnosis.md 1.2 and 1.4.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from itertools import cycle
 
 import numpy as np
 
@@ -23,8 +22,6 @@ from workbench.fitting.costs import (
     points_costs,
 )
 from workbench.fitting.linearised import (
-    FINE_STEP,
-    PARAMETER_STEP,
     Linearised,
     Point,
     linearise,
@@ -108,31 +105,25 @@ def fit_windows(
     beyond noise, the next uses the same derivatives, corrected by what the step showed: they are
     the dear part.  Parts of the whole cost would be no measure: most of it is noise that no fit
     takes away, and effects that differ by less would be compared half fitted.
-
-    Derivatives are differences over wide steps, which see across break-aways and impacts, and in
-    turn over fine ones: in a valley that is narrower than the wide ones these lead nowhere.  Only
-    where neither brings anything has a fit converged.
-
     ``start`` is a point, or what it costs where it was run already.  ``at`` are derivatives to
     begin with, taken near by, with the residual of the start.
     """
     start = start or Point(unknowns.scaled(windows.plant.values), windows.start)
     now = start if isinstance(start, Cost) else points_costs(windows, unknowns, [start]).best
-    widths = (PARAMETER_STEP, FINE_STEP) if len(unknowns) else (PARAMETER_STEP,)
-    turn, idle, fresh, stale = cycle(widths), 0, False, at is None
+    fresh, converged, stale = False, False, at is None
     for _ in range(iterations):
         if stale or at is None:
-            at, fresh = linearise(windows, unknowns, now.point, now.residual, next(turn)), True
+            at, fresh = linearise(windows, unknowns, now.point, now.residual), True
         now, fall = _advanced(windows, unknowns, at, now)
-        idle = idle + fresh if fall < CONVERGED else 0
-        if idle == len(widths):
+        converged = fresh and fall < CONVERGED
+        if converged:
             break
         stale, fresh = fall < AGAIN, False
         if not stale:
             at = secant(windows, at, now.point, now.residual)
     at = at or linearise(windows, unknowns, now.point, now.residual)
     at = seen_at(windows, at, now.point, now.residual)
-    return Fit(windows, unknowns, now.point, now.chi2, now.cost, idle == len(widths), at)
+    return Fit(windows, unknowns, now.point, now.chi2, now.cost, converged, at)
 
 
 def follow(

@@ -19,7 +19,6 @@ from workbench.fitting.windows import Windows
 from workbench.plant import Plant
 
 PARAMETER_STEP = 0.25  # of the scale of an unknown
-FINE_STEP = 0.03  # the same in a valley that is narrower: what many windows know, they know to this
 START_STEP = 0.25  # of the deviation of a start state
 
 
@@ -72,22 +71,17 @@ class Linearised:
 
 
 def linearise(
-    windows: Windows,
-    unknowns: Unknowns,
-    point: Point,
-    residual: np.ndarray | None = None,
-    step: float = PARAMETER_STEP,
+    windows: Windows, unknowns: Unknowns, point: Point, residual: np.ndarray | None = None
 ) -> Linearised:
     """Residuals and derivatives by one batch of simulations; see :class:`Linearised`.
 
-    ``step`` is that of the differences, of the scale of an unknown.  ``residual`` is that of the
-    point, (n_y, n_windows, L), where it was run already.
+    ``residual`` is that of the point, (n_y, n_windows, L), where it was run already.
     """
     n_x, n_p = windows.start.shape[0], len(unknowns)
     plants = [plant_at(windows, unknowns, point.t)] * n_x
     starts = [_stepped_start(windows, point, k) for k in range(n_x)]
     starts += [point.starts] * n_p
-    h_p = parameter_steps(unknowns, point.t, step)
+    h_p = parameter_steps(unknowns, point.t)
     plants += [plant_at(windows, unknowns, point.t + h_p[k] * unit(n_p, k)) for k in range(n_p)]
     here = _run_once(windows, unknowns, point) if residual is None else residual
     n, change = len(windows), windows.residuals(plants, np.array(starts)) - here
@@ -166,7 +160,7 @@ def borrowed(
     ``near`` belongs to the windows and unknowns ``known``, of a plant with fewer states or effects.
     ``residual`` is that of the point, (n_y, n_windows, L), where it was run already.
     """
-    h, t, n_p = parameter_steps(unknowns, point.t, PARAMETER_STEP), point.t, len(unknowns)
+    h, t, n_p = parameter_steps(unknowns, point.t), point.t, len(unknowns)
     ours, theirs = list(windows.plant.state_list), list(known[0].plant.state_list)
     new_p = [k for k, name in enumerate(unknowns.names) if name not in known[1].names]
     new_x = [k for k, name in enumerate(ours) if name not in theirs]
@@ -249,10 +243,10 @@ def plant_at(windows: Windows, unknowns: Unknowns, t: np.ndarray) -> Plant:
     return windows.plant.with_values(unknowns.values(t))
 
 
-def parameter_steps(unknowns: Unknowns, t: np.ndarray, step: float) -> np.ndarray:
+def parameter_steps(unknowns: Unknowns, t: np.ndarray) -> np.ndarray:
     """Steps of the scaled unknowns, turned round where they would leave the bounds."""
     room = (unknowns.upper - unknowns.prior) / unknowns.scale - t
-    return np.where(room > step, step, -step)
+    return np.where(room > PARAMETER_STEP, PARAMETER_STEP, -PARAMETER_STEP)
 
 
 def unit(n: int, k: int) -> np.ndarray:
