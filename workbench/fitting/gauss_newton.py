@@ -16,7 +16,6 @@ import numpy as np
 
 from workbench.fitting.costs import (
     Cost,
-    Costs,
     best_of_each,
     costs_of_best_starts,
     points_costs,
@@ -38,6 +37,7 @@ LONGEST_FREE_STEP = 40.0  # of one without a prior, which is counted in tenths o
 LONGEST_START_STEP = 8.0  # of a start state, in its deviations
 DAMPINGS = (0.0, 0.3, 3.0, 30.0)
 HALF = 0.5  # of the fall that the quadratic model promises: then a step needs no rivals
+ASTRAY = 4.0  # times its cost: so dear a window gets by start states where it keeps them instead
 AGAIN = 0.02  # fall, in parts of the misfit, above which derivatives are used once more
 CONVERGED = 0.01  # the same, below which a fit has converged
 NOISE_KNOWN_TO = 0.05  # of its square
@@ -163,20 +163,31 @@ def _stepped(windows: Windows, unknowns: Unknowns, at: Linearised, now: Cost) ->
     Where start states alone move, every window takes the step that suits it best.
     """
     steps = _damped_steps(at, unknowns)
-    first = _costs_after(windows, unknowns, now, steps[:1]).best
+    full, *others = (_after(windows, unknowns, now.point, step) for step in steps)
+    first = points_costs(windows, unknowns, [full]).best
+    if not len(unknowns):
+        first = best_of_each((now, first))
     promised = now.cost - _promised(at, unknowns, steps[0])
     if now.cost - first.cost > HALF * promised > 0:
         return first
-    damped = _costs_after(windows, unknowns, now, steps[1:])
+    damped = points_costs(windows, unknowns, others)
     if not len(unknowns):
         return best_of_each((first, *damped.rows))
     best = min((first, damped.best), key=lambda each: each.cost)
     if now.cost - best.cost > AGAIN * beyond_noise(now.cost, windows):
         return best
     worse = first.by_window > now.by_window
-    if not worse.any() or worse.all():
+    left = []
+    if worse.any() and not worse.all():
+        less = _damped_steps(at, unknowns, ~worse)
+        left = [_after(windows, unknowns, now.point, step) for step in less]
+    if np.any(first.by_window > ASTRAY * now.by_window):
+        tried = [full, *others, *left]
+        again = costs_of_best_starts(windows, unknowns, tried, now.point.starts).best
+    elif left:
+        again = points_costs(windows, unknowns, left).best
+    else:
         return best
-    again = _costs_after(windows, unknowns, now, _damped_steps(at, unknowns, ~worse)).best
     return min(best, again, key=lambda each: each.cost)
 
 
@@ -190,15 +201,6 @@ def beyond_noise(squares: float, windows: Windows) -> float:
 
 
 Step = tuple[np.ndarray, np.ndarray]  # of the scaled unknowns, and of the scaled start states
-
-
-def _costs_after(windows: Windows, unknowns: Unknowns, now: Cost, steps: list[Step]) -> Costs:
-    """What steps cost; each window moves its start states or keeps them, as suits it better."""
-    moved = [_after(windows, unknowns, now.point, step) for step in steps]
-    if not len(unknowns):  # kept is where it stands, and has been run
-        rows = points_costs(windows, unknowns, moved).rows
-        return Costs(tuple(best_of_each((now, each)) for each in rows))
-    return costs_of_best_starts(windows, unknowns, moved, now.point.starts)
 
 
 def _after(windows: Windows, unknowns: Unknowns, point: Point, step: Step) -> Point:
