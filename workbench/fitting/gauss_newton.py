@@ -158,7 +158,9 @@ def _stepped(windows: Windows, unknowns: Unknowns, at: Linearised, now: Cost) ->
 
     Where none brings much, the windows that got worse under the full step are left out of the
     quadratic model, and its steps are tried again: a window that runs across a break-away has
-    slopes that hold nowhere, and would hold all others back.
+    slopes that hold nowhere, and would hold all others back.  Where one costs several times what it
+    did, its start states have gone astray, as those of an armature next to its stop do by a linear
+    model: then every window may keep its own in all these steps.
 
     Where start states alone move, every window takes the step that suits it best.
     """
