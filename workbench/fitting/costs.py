@@ -75,15 +75,21 @@ def points_costs(windows: Windows, unknowns: Unknowns, points: list[Point]) -> C
 
 
 def costs_of_best_starts(
-    windows: Windows, unknowns: Unknowns, points: Sequence[Point], starts: np.ndarray
+    windows: Windows, unknowns: Unknowns, points: list[Point], starts: np.ndarray
 ) -> Costs:
     """Costs of points whose windows begin as the point says or with ``starts``, as suits each.
 
-    Where a valve opens or a piston hits, the linear model of a start state holds nowhere.  One
-    window that followed it would make a whole step dear, however well the others take it.
     ``starts``, (n_x, n_windows), are those of a place near by.
     """
-    kept = [Point(point.t, starts) for point in points]
-    rows = points_costs(windows, unknowns, [*points, *kept]).rows
-    pairs = zip(rows[: len(points)], rows[len(points) :], strict=True)
+    return or_kept_starts(windows, unknowns, points_costs(windows, unknowns, points), starts)
+
+
+def or_kept_starts(windows: Windows, unknowns: Unknowns, costs: Costs, starts: np.ndarray) -> Costs:
+    """The same points where each window may begin with ``starts`` too; none is run again.
+
+    Where a valve opens or a piston hits, the linear model of a start state holds nowhere.  One
+    window that followed it would make a whole step dear, however well the others take it.
+    """
+    kept = points_costs(windows, unknowns, [Point(row.point.t, starts) for row in costs.rows])
+    pairs = zip(costs.rows, kept.rows, strict=True)
     return Costs(tuple(best_of_each(pair) for pair in pairs))

@@ -16,8 +16,9 @@ import numpy as np
 
 from workbench.fitting.costs import (
     Cost,
+    Costs,
     best_of_each,
-    costs_of_best_starts,
+    or_kept_starts,
     points_costs,
 )
 from workbench.fitting.linearised import (
@@ -156,41 +157,43 @@ def _advanced(
 def _stepped(windows: Windows, unknowns: Unknowns, at: Linearised, now: Cost) -> Cost:
     """The full step where it keeps half of what it promises, else the best of several damped ones.
 
-    Where none brings much, the windows that got worse under the full step are left out of the
-    quadratic model, and its steps are tried again: a window that runs across a break-away has
-    slopes that hold nowhere, and would hold all others back.  Where one costs several times what it
-    did, its start states have gone astray, as those of an armature next to its stop do by a linear
-    model: then every window may keep its own in all these steps.
-
-    Where start states alone move, every window takes the step that suits it best.
+    Where none brings much, others are tried; see :func:`_rescued`.  Where start states alone move,
+    every window takes the step that suits it best.
     """
-    steps = _damped_steps(at, unknowns)
-    full, *others = (_after(windows, unknowns, now.point, step) for step in steps)
-    first = points_costs(windows, unknowns, [full]).best
+    full, *damped = _damped_steps(at, unknowns)
+    first = points_costs(windows, unknowns, [_after(windows, unknowns, now.point, full)])
     if not len(unknowns):
-        first = best_of_each((now, first))
-    promised = now.cost - _promised(at, unknowns, steps[0])
-    if now.cost - first.cost > HALF * promised > 0:
-        return first
-    damped = points_costs(windows, unknowns, others)
+        first = Costs((best_of_each((now, *first.rows)),))
+    promised = now.cost - _promised(at, unknowns, full)
+    if now.cost - first.best.cost > HALF * promised > 0:
+        return first.best
+    others = [_after(windows, unknowns, now.point, step) for step in damped]
+    tried = Costs((*first.rows, *points_costs(windows, unknowns, others).rows))
     if not len(unknowns):
-        return best_of_each((first, *damped.rows))
-    best = min((first, damped.best), key=lambda each: each.cost)
-    if now.cost - best.cost > AGAIN * beyond_noise(now.cost, windows):
-        return best
-    worse = first.by_window > now.by_window
-    left = []
+        return best_of_each(tried.rows)
+    if now.cost - tried.best.cost > AGAIN * beyond_noise(now.cost, windows):
+        return tried.best
+    return _rescued(windows, unknowns, at, now, tried)
+
+
+def _rescued(windows: Windows, unknowns: Unknowns, at: Linearised, now: Cost, tried: Costs) -> Cost:
+    """The best of steps that hardly lower the cost, and of steps from what holds them back.
+
+    Windows that got worse under the full step, the first one tried, are left out of the quadratic
+    model, and its steps are tried again: a window that runs across a break-away has slopes that
+    hold nowhere.  Where one costs several times what it did, its start states have gone astray, as
+    those of an armature next to its stop do by a linear model: then every window may keep its own
+    in all of the steps.
+    """
+    full = tried.rows[0]
+    worse = full.by_window > now.by_window
     if worse.any() and not worse.all():
         less = _damped_steps(at, unknowns, ~worse)
         left = [_after(windows, unknowns, now.point, step) for step in less]
-    if np.any(first.by_window > ASTRAY * now.by_window):
-        tried = [full, *others, *left]
-        again = costs_of_best_starts(windows, unknowns, tried, now.point.starts).best
-    elif left:
-        again = points_costs(windows, unknowns, left).best
-    else:
-        return best
-    return min(best, again, key=lambda each: each.cost)
+        tried = Costs((*tried.rows, *points_costs(windows, unknowns, left).rows))
+    if np.any(full.by_window > ASTRAY * now.by_window):
+        tried = or_kept_starts(windows, unknowns, tried, now.point.starts)
+    return tried.best
 
 
 def beyond_noise(squares: float, windows: Windows) -> float:
