@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from test_fitting import NOISE, sines
 
+from workbench.fitting.errors import at_noise
 from workbench.fitting.gauss_newton import fit_windows
-from workbench.fitting.short_windows import at_noise, better_from_short_windows
+from workbench.fitting.short_windows import better_from_short_windows
 from workbench.fitting.unknowns import nominal_unknowns
 from workbench.fitting.windows import cut_windows
 from workbench.plants import servo_drive

@@ -42,6 +42,8 @@ class SignalError:
 
 
 AT_NOISE = 1.5  # mean square of an output's error over that of its noise
+COLOURED = 0.1  # of a mean square, beyond what successive differences tell of it
+CHANCE = 5.0  # deviations of that share, 1 / sqrt(n) each, for white noise
 
 Errors = Mapping[str, Mapping[str, SignalError]]
 
@@ -119,3 +121,34 @@ def errors_of(train: Fit, validation: Fit | None) -> Errors:
 def at_noise(fit: Fit) -> bool:
     """True where the mean square error of every output is that of its noise."""
     return bool(np.all(penalised_rmse(fit) ** 2 < AT_NOISE * fit.windows.noise**2))
+
+
+def white_level(fit: Fit) -> np.ndarray:
+    """What of the errors of each output is white, from their successive differences; SI, (n_y,).
+
+    Half of the mean squared difference of neighbours is the variance of white noise, and hardly
+    holds what is left of the plant, which is slower.  NaN where no neighbours are recorded.
+    """
+    windows = fit.windows
+    seen = np.isfinite(windows.measured) & ~fit.unsimulated
+    error = np.where(seen, fit.residual * windows.scale[:, :, None], np.nan)
+    steps = np.diff(error, axis=2)
+    count = np.isfinite(steps).sum(axis=(1, 2))
+    squares = np.nansum(steps**2, axis=(1, 2))
+    return np.sqrt(np.divide(squares, 2 * count, out=np.full(len(count), np.nan), where=count > 0))
+
+
+def only_noise(fit: Fit) -> bool:
+    """True where the errors of every output are at their noise and, as noise is, white.
+
+    The noise that quiet parts of a recording tell is too large where few parts are quiet: errors a
+    tenth above the true one then pass for it.  So each output is also asked for the ratio of its
+    mean square to that of its successive differences.
+
+    Source: von Neumann 1941, "Distribution of the ratio of the mean square successive difference to
+    the variance"; its standard deviation over n values is 1 / sqrt(n).
+    """
+    count = np.isfinite(fit.windows.measured).sum(axis=(1, 2))
+    most = 1.0 + np.maximum(COLOURED, CHANCE / np.sqrt(np.maximum(count, 1)))
+    coloured = penalised_rmse(fit) ** 2 > most * white_level(fit) ** 2
+    return at_noise(fit) and not np.any(coloured)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from workbench.consistency import checked
+from workbench.fitting.begun_anew import begun_anew
 from workbench.fitting.errors import Errors, errors_of
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.own_errors import by_own_errors
@@ -94,8 +95,8 @@ def fit(
         warnings.warn(NO_EVIDENCE, stacklevel=2)
     progress("fit")
     problem = pose(held, train, validation)
-    progress("the same by its own errors and from short windows, if that is better")
-    own = by_own_errors(problem.base)
+    progress("the same by its own errors and from other starts, if that is better")
+    own = begun_anew(by_own_errors(problem.base))
     problem = problem if own is problem.base else problem.with_base(own)
     problem = better_from_short_windows(problem, train)
     base = problem.base

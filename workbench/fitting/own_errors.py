@@ -6,9 +6,10 @@ weights from what it leaves itself, and two fits, each with its own weights, are
 
     2 sum_k n_k log(max(e_k, noise_k)) + price of the priors
 
-with e_k the error of output k over all windows and n_k its samples over the time for which errors
-are correlated: twice the negative logarithm of the posterior where the variance of each output's
-errors is what it leaves.
+with e_k the error of output k over all windows, n_k its samples over the time for which errors are
+correlated, and noise_k its noise, or less where the errors of one of the fits are white at a lower
+level: twice the negative logarithm of the posterior where the variance of each output's errors is
+what it leaves.
 
 Source: the concentrated likelihood, Seber and Wild 1989, "Nonlinear regression", section 2.2.
 """
@@ -18,7 +19,7 @@ from __future__ import annotations
 import numpy as np
 
 from workbench.fitting.continued import continued
-from workbench.fitting.errors import at_noise, penalised_rmse
+from workbench.fitting.errors import at_noise, only_noise, penalised_rmse, white_level
 from workbench.fitting.gauss_newton import Fit, fit_windows
 from workbench.fitting.windows import Windows
 
@@ -57,9 +58,9 @@ def _stale(fit: Fit) -> bool:
 def by_own_errors(fit: Fit) -> Fit:
     """The fit weighed anew and from starts that earlier windows give, if that one is better.
 
-    Nothing is tried where all outputs are at their noise.
+    Nothing is tried where only noise is left.
     """
-    if at_noise(fit):
+    if only_noise(fit):
         return fit
     tried = fit
     for _ in range(WEIGHINGS):
@@ -69,10 +70,11 @@ def by_own_errors(fit: Fit) -> Fit:
 
 def better_of(fit: Fit, tried: Fit) -> Fit:
     """Of two fits of the same windows the one with the larger posterior; see the module."""
-    windows, samples = fit.windows, effective_by_output(fit.windows)
+    samples = effective_by_output(fit.windows)
+    noise = np.fmin(fit.windows.noise, np.fmin(white_level(fit), white_level(tried)))
 
     def surprise(each: Fit) -> float:
-        errors = np.maximum(penalised_rmse(each), windows.noise)
+        errors = np.maximum(penalised_rmse(each), noise)
         return float(2.0 * samples @ np.log(errors)) + each.cost - each.chi2
 
     return tried if surprise(tried) < surprise(fit) else fit

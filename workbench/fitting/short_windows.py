@@ -17,8 +17,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from workbench.fitting.begun_anew import begun_anew
 from workbench.fitting.continued import continued
-from workbench.fitting.errors import at_noise
+from workbench.fitting.errors import only_noise
 from workbench.fitting.own_errors import ITERATIONS, better_of, by_own_errors
 from workbench.fitting.problem import Problem, fitted_twice
 from workbench.fitting.window_length import FEWEST_SAMPLES, moves
@@ -31,16 +32,17 @@ SHARES = (0.1, 0.2, 0.4, 0.7)  # of the length of a window, one after the other
 def better_from_short_windows(problem: Problem, train: Sequence[Recording]) -> Problem:
     """The problem with the fit that begins where short windows lead, if that one is better.
 
-    Nothing is tried where all outputs are at their noise, nothing moves, or windows are short.
+    Nothing is tried where only noise is left, nothing moves, or windows are short.
     """
     base = problem.base
     plant = base.windows.plant
     tenth = round(SHARES[0] * base.windows.length)
-    if at_noise(base) or not moves(plant) or not len(base.unknowns) or tenth < FEWEST_SAMPLES:
+    if only_noise(base) or not moves(plant) or not len(base.unknowns) or tenth < FEWEST_SAMPLES:
         return problem
     t = _of_short_windows(problem, train)
     tried = fitted_twice(base.windows, base.unknowns, t)
-    better = better_of(base, by_own_errors(continued(tried, ITERATIONS)))
+    tried = begun_anew(by_own_errors(continued(tried, ITERATIONS)))
+    better = better_of(base, tried)
     return problem if better is base else problem.with_base(better)
 
 
