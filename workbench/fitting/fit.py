@@ -95,9 +95,10 @@ def fit(
         warnings.warn(NO_EVIDENCE, stacklevel=2)
     progress("fit")
     problem = pose(held, train, validation)
-    progress("the same by its own errors and from other starts, if that is better")
+    progress("the same by its own errors, what went far begun anew at its prior")
     own = begun_anew(by_own_errors(problem.base))
     problem = problem if own is problem.base else problem.with_base(own)
+    progress("from short windows, if that is better")
     problem = better_from_short_windows(problem, train)
     base = problem.base
     before = errors_of(*as_it_came(base, problem.base_validation))
