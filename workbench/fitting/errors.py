@@ -48,6 +48,11 @@ CHANCE = 5.0  # deviations of that share, 1 / sqrt(n) each, for white noise
 Errors = Mapping[str, Mapping[str, SignalError]]
 
 
+def in_units(fit: Fit) -> np.ndarray:
+    """Errors of a fit in SI, (n_y, n_windows, L), zero where nothing is recorded."""
+    return fit.residual * fit.windows.scale[:, :, None]
+
+
 def signal_errors(fit: Fit) -> dict[str, SignalError]:
     """RMSE and fit percent of each output over all windows, by public name.
 
@@ -55,7 +60,7 @@ def signal_errors(fit: Fit) -> dict[str, SignalError]:
     percent is MATLAB's 100 (1 - |y - yhat| / |y - mean(y)|), over windows with free start.
     """
     windows = fit.windows
-    error = fit.residual * windows.scale[:, :, None]
+    error = in_units(fit)
     found, lost = {}, fit.unsimulated
     for k, name in enumerate(windows.plant.measured):
         seen = np.isfinite(windows.measured[k]) & ~lost[k]
@@ -90,7 +95,7 @@ def per_sample(fit: Fit | None) -> float:
     if fit is None:
         return float("nan")
     windows = fit.windows
-    error = fit.residual * windows.scale[:, :, None] / windows.noise[:, None, None]
+    error = in_units(fit) / windows.noise[:, None, None]
     return float((error**2).sum() / windows.count)
 
 
@@ -108,7 +113,7 @@ def plain_ratio(before: Fit | None, after: Fit | None) -> float:
 def penalised_rmse(fit: Fit) -> np.ndarray:
     """RMSE of each output in SI with the penalty of what could not be simulated, (n_y,)."""
     windows = fit.windows
-    squares = ((fit.residual * windows.scale[:, :, None]) ** 2).sum(axis=(1, 2))
+    squares = (in_units(fit) ** 2).sum(axis=(1, 2))
     return np.sqrt(squares / np.maximum(np.isfinite(windows.measured).sum(axis=(1, 2)), 1))
 
 
@@ -131,7 +136,7 @@ def white_level(fit: Fit) -> np.ndarray:
     """
     windows = fit.windows
     seen = np.isfinite(windows.measured) & ~fit.unsimulated
-    error = np.where(seen, fit.residual * windows.scale[:, :, None], np.nan)
+    error = np.where(seen, in_units(fit), np.nan)
     steps = np.diff(error, axis=2)
     count = np.isfinite(steps).sum(axis=(1, 2))
     squares = np.nansum(steps**2, axis=(1, 2))

@@ -161,14 +161,13 @@ def _stepped(windows: Windows, unknowns: Unknowns, at: Linearised, now: Cost) ->
     every window takes the step that suits it best.
     """
     full, *damped = _damped_steps(at, unknowns)
-    first = points_costs(windows, unknowns, [_after(windows, unknowns, now.point, full)])
+    first = _costs_after(windows, unknowns, now, [full])
     if not len(unknowns):
         first = Costs((best_of_each((now, *first.rows)),))
     promised = now.cost - _promised(at, unknowns, full)
     if now.cost - first.best.cost > HALF * promised > 0:
         return first.best
-    others = [_after(windows, unknowns, now.point, step) for step in damped]
-    tried = Costs((*first.rows, *points_costs(windows, unknowns, others).rows))
+    tried = Costs((*first.rows, *_costs_after(windows, unknowns, now, damped).rows))
     if not len(unknowns):
         return best_of_each(tried.rows)
     if now.cost - tried.best.cost > AGAIN * beyond_noise(now.cost, windows):
@@ -189,8 +188,7 @@ def _rescued(windows: Windows, unknowns: Unknowns, at: Linearised, now: Cost, tr
     worse = full.by_window > now.by_window
     if worse.any() and not worse.all():
         less = _damped_steps(at, unknowns, ~worse)
-        left = [_after(windows, unknowns, now.point, step) for step in less]
-        tried = Costs((*tried.rows, *points_costs(windows, unknowns, left).rows))
+        tried = Costs((*tried.rows, *_costs_after(windows, unknowns, now, less).rows))
     if np.any(full.by_window > ASTRAY * now.by_window):
         tried = or_kept_starts(windows, unknowns, tried, now.point.starts)
     return tried.best
@@ -206,6 +204,12 @@ def beyond_noise(squares: float, windows: Windows) -> float:
 
 
 Step = tuple[np.ndarray, np.ndarray]  # of the scaled unknowns, and of the scaled start states
+
+
+def _costs_after(windows: Windows, unknowns: Unknowns, now: Cost, steps: list[Step]) -> Costs:
+    """What steps cost, all run in one batch."""
+    points = [_after(windows, unknowns, now.point, step) for step in steps]
+    return points_costs(windows, unknowns, points)
 
 
 def _after(windows: Windows, unknowns: Unknowns, point: Point, step: Step) -> Point:
