@@ -25,6 +25,7 @@ import numpy as np
 
 from workbench.comparison.course import Course
 from workbench.filter_passes import FilterResult, filter_pass, recording_filter
+from workbench.fitting.errors import in_units
 from workbench.fitting.start_states import refit_starts
 from workbench.fitting.window_length import window_length_s
 from workbench.fitting.windows import TooShortError, Windows, cut_windows
@@ -166,7 +167,7 @@ def _windows(windows: Windows, paths: Sequence[np.ndarray]) -> tuple[Rows, list[
     begun = [path[:, list(firsts)] for path in paths]
     begun = [np.where(np.isfinite(each), each, windows.start) for each in begun]
     fit = refit_starts(windows, others=begun)
-    simulated = windows.measured - fit.residual * windows.scale[:, :, None]
+    simulated = windows.measured - in_units(fit)
     simulated[fit.unsimulated] = np.nan
     rows = np.full((len(simulated), len(recording)), np.nan)
     lost, recorded = np.zeros((2, len(recording)), dtype=bool)

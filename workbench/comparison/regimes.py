@@ -13,6 +13,7 @@ import numpy as np
 from workbench.comparison.course import Course, course_of
 from workbench.comparison.gear_shift import phases
 from workbench.comparison.motion import motion
+from workbench.fitting.errors import in_units
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.starts import guessed_states
 from workbench.plant import Plant, Signal
@@ -77,7 +78,7 @@ def regime_shares(fit: Fit) -> dict[str, float]:
     """
     windows, plant = fit.windows, fit.plant.lean()
     known = (windows.weight > 0) & ~fit.unsimulated
-    squares = equally_weighted(np.where(known, fit.residual * windows.scale[:, :, None], np.nan))
+    squares = equally_weighted(np.where(known, in_units(fit), np.nan))
     sums: dict[str, float] = {}
     done = 0
     for recording, firsts in zip(windows.recordings, windows.firsts, strict=True):

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from workbench.fitting.error_model import ACTIVE
+from workbench.fitting.errors import in_units
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.noise import NoNoiseError, measured_noise
 from workbench.fitting.starts import long_holes, sensed_states
@@ -108,7 +109,7 @@ def _simulated(plant: Plant, readings: Sequence[Recording], where: Probe) -> np.
 def left_unexplained(fit: Fit) -> dict[str, float]:
     """The same for the windows of a fit, by full name of the outputs that move."""
     windows = fit.windows
-    error = fit.residual * windows.scale[:, :, None]
+    error = in_units(fit)
     stateless = not windows.plant.state_list
     moves = _motion(windows, stateless) > ACTIVE * windows.noise
     found = _ratio(error, windows.measured, stateless)
