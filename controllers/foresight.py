@@ -26,8 +26,8 @@ from controllers.scheduled import Schedule, with_modes
 from linearize.discrete import sampled
 from linearize.modes import HybridModel, Mode
 from workbench.contracts import Controller
-from workbench.effects.valve_command import command_delay_s
 from workbench.plant import Plant
+from workbench.simulation import command_delay_s
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ def foreseeing(
     hybrid: HybridModel, laws: Schedule[Law], sample_time_s: float, axis: Axis | None = None
 ) -> Schedule[Law]:
     """The laws of all driven modes, each behind the foresight of its mode."""
-    delay_s = command_delay_s(hybrid.plant.effects)
+    delay_s = command_delay_s(hybrid.plant)
 
     def ahead(mode: Mode, law: Law) -> Law:
         return foresighted(mode, law, sample_time_s, delay_s)

@@ -6,7 +6,8 @@
           lower - slack <= position, velocity, pressures <= upper + slack,   slack >= 0,
           |u_i - u_i-1| <= move + slack
 
-P is the cost-to-go of the LQ design, so that without active limits the first move is that of LQ.
+P is the cost-to-go of the LQ design, which has no price S of moves: without active limits the first
+move is that of LQ, but for what S takes off it.
 Steady errors are taken out by a disturbance force on the slide, which grows with the integral of
 the error: the prediction feels it and the target pressures balance it.  Inputs are limited hard,
 states and the rate of the input softly, so that the program always has a solution.  Since a

@@ -73,10 +73,14 @@ def lq_gain(
 
 
 def with_integral(mode: Mode, sample_time_s: float) -> tuple[np.ndarray, np.ndarray]:
-    """F and G of a sampled mode, extended by the integral of its first state."""
+    """F and G of a sampled mode, extended by the integral of its first state.
+
+    The integral holds the state of its own sample, as the controllers run it.
+    """
     small, n = sampled(mode, sample_time_s), len(mode.state_names)
     F, G = np.eye(n + 1), np.zeros((n + 1, 1))
-    F[:n, :n], F[n, 0], G[:n] = small.F, sample_time_s, small.G
+    F[:n, :n], G[:n] = small.F, small.G
+    F[n, :n], G[n] = sample_time_s * small.F[0], sample_time_s * small.G[0]
     return F, G
 
 

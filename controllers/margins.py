@@ -26,9 +26,8 @@ from controllers.axis import Axis
 from controllers.scheduled import Schedule, driven_modes
 from linearize.discrete import sampled
 from linearize.modes import HybridModel, Mode
-from workbench.effects.timing import SensorDelay
-from workbench.effects.valve_command import command_delay_s
 from workbench.plant import Plant
+from workbench.simulation import command_delay_s, output_delay_s
 
 POINTS = 2000  # frequencies from far below the bandwidth to half the sampling rate
 LOWEST_RAD_S = 0.1
@@ -54,7 +53,7 @@ class Margins:
     """What may change at the plant's input before the loop of one mode becomes unstable.
 
     gain         factors down to and up to which the gain may go, 0 and inf where there is no end
-    phase_rad    lag that may come on top
+    phase_rad    smallest turn of L that ends at -1, a lag or a lead
     delay_s      delay that may come on top
     distance     smallest distance of L from -1, 1/M_s of the textbooks
     disk         size a of the balanced disk in which gain and phase may vary at once, 2 / |S - T|
@@ -126,12 +125,12 @@ def closed(mode: Mode, law: Law, sample_time_s: float, delay_s: float = 0.0) -> 
 
 def unforeseen_s(plant: Plant) -> float:
     """Delay of the sensors: no estimator that looks ahead foresees it."""
-    return sum(float(e.delay_s) for e in plant.effects if isinstance(e, SensorDelay))
+    return output_delay_s(plant)
 
 
 def both_ways_s(plant: Plant) -> float:
     """Delay of commands and sensors together, which a law on the raw measurement meets."""
-    return unforeseen_s(plant) + command_delay_s(plant.effects)
+    return unforeseen_s(plant) + command_delay_s(plant)
 
 
 def margins_of(mode: Mode, law: Law, sample_time_s: float, delay_s: float = 0.0) -> Margins:

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from workbench.contracts import Estimate
-from workbench.effects.valve_command import command_delay_s
 from workbench.filtering import consistent_start
 from workbench.plant import Plant
+from workbench.simulation import command_delay_s
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,5 +69,5 @@ def in_time(estimator: Any, plant: Plant) -> Any:
 
     Of several commands the one that is delayed most counts.
     """
-    delay_s = command_delay_s(plant.effects)
+    delay_s = command_delay_s(plant)
     return Ahead(inner=estimator, plant=plant, delay_s=delay_s) if delay_s else estimator

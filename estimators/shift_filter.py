@@ -38,7 +38,7 @@ from linearize.valve_spread import (
 from workbench.called import prepared
 from workbench.compiled import compiled
 from workbench.contracts import Estimate
-from workbench.filtering import correct, predict
+from workbench.filtering import consistent_start, correct, predict
 from workbench.plant import Plant
 
 NAMES = (*STATES, *STRENGTHS, *FLOW_GAINS)
@@ -87,10 +87,15 @@ class ShiftFilter:
         return {name: getattr(self, name) for name in self.__dataclass_fields__}
 
     def start(self, measurement: np.ndarray) -> Estimate:
-        known = dict(zip(self.plant.measured, measurement, strict=True))
-        x = np.array([known.get(name, 0.0) for name in NAMES])
-        first = {**self.measurement_noise, VELOCITY: START_M_S}
-        P = np.diag(np.array([*(first[name] for name in STATES), *self._learned]) ** 2)
+        """The state that a measurement tells; what is not received is as at the plant's start."""
+        told = dict(zip(self.plant.measured, measurement, strict=True))
+        known = {name: value for name, value in told.items() if np.isfinite(value)}
+        states = list(self.plant.state_list)
+        rows = [states.index(name) for name in STATES]
+        x = np.array([*consistent_start(self.plant, known)[rows], *np.zeros(len(self._learned))])
+        spread = dict(zip(STATES, self.plant.scale[rows], strict=True))
+        spread |= {VELOCITY: START_M_S, **{name: self.measurement_noise[name] for name in known}}
+        P = np.diag(np.array([*spread.values(), *self._learned]) ** 2)
         return Estimate(NAMES, x, P, tuple(valve.begun for valve in self.valves))
 
     def update(self, last: Estimate, command: np.ndarray, measurement: np.ndarray) -> Estimate:

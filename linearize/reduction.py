@@ -23,7 +23,8 @@ from workbench.effects.bristle_friction import BristleFriction
 from workbench.effects.sensor_response import SensorLag
 from workbench.effects.solenoid_valve import SolenoidValve
 from workbench.effects.supply_droop import SupplyDroop
-from workbench.effects.valve_command import CommandDelay, DeadZone, ValveLag, ValveOffset
+from workbench.effects.timing import Timing
+from workbench.effects.valve_command import DeadZone, ValveLag, ValveOffset
 from workbench.effects.valve_hysteresis import ValveHysteresis
 from workbench.effects.wall_heat import HeatedWall
 from workbench.floating_piston import ControlChamber
@@ -275,5 +276,5 @@ def _left_out(plant: Plant) -> Iterator[LeftOut]:
             yield LeftOut(member.name, "no play", "a play has no linear model")
         elif isinstance(member, SensorLag):
             yield LeftOut(member.name, "no lag", "the margins must hold it")
-        elif isinstance(member, CommandDelay):
+        elif isinstance(member, Timing):
             yield LeftOut(member.name, "no delay", "acts on samples; the margins must hold it")

@@ -16,12 +16,11 @@ from studies.following import BENCHES, ELLIPSE_M, leg_of
 from studies.following_check import check_followed, followed, observer_of, tasks_of
 from studies.specification import read_specification
 from workbench.contracts import Estimate
-from workbench.effects.valve_command import command_delay_s
 from workbench.plants import PLANTS
 from workbench.plants.soft_joint import ATMOSPHERE_PA, PRESSURE
 from workbench.recording import Recording
 from workbench.rig import default_rig
-from workbench.simulation import simulate
+from workbench.simulation import command_delay_s, simulate
 
 AXIS_METHODS = ("axis-lq", "axis-pid", "feedback-linearisation")
 
@@ -207,10 +206,10 @@ def test_raw_hands_the_sensors_on_and_an_unknown_estimator_is_told():
 
 
 def test_of_several_delayed_commands_the_longest_counts_and_not_their_sum():
-    assert command_delay_s(PLANTS["crr_leg"]().effects) == pytest.approx(1e-3)
-    assert command_delay_s(PLANTS["crr_rig"]().effects) == pytest.approx(1e-3)
+    assert command_delay_s(PLANTS["crr_leg"]()) == pytest.approx(1e-3)
+    assert command_delay_s(PLANTS["crr_rig"]()) == pytest.approx(1e-3)
     late = PLANTS["crr_leg"]().with_values({"command_delay@valve_2.delay_s": 3e-3})
-    assert command_delay_s(late.effects) == pytest.approx(3e-3)
+    assert command_delay_s(late) == pytest.approx(3e-3)
 
 
 def test_a_specification_of_the_arm_asks_in_degrees_and_one_of_the_joint_in_bar():

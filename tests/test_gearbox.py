@@ -242,3 +242,14 @@ def test_a_shift_is_exact_to_a_tenth_of_the_sensor_noise(pieces):
     assert worst_pa < 100.0
     assert mean_m < 0.2e-6
     assert mean_pa < 10.0
+
+
+@pytest.mark.parametrize("coil_k", [293.15, 350.0])
+def test_a_valve_long_energised_carries_the_current_of_its_warm_coil(coil_k):
+    plant = gearbox().with_values({"valve_1.coil_temperature_k": coil_k}).lean()
+    record = run(plant, [((1, 0), 0.3)])
+    valve = next(member for member in plant.members if member.name == "valve_1")
+    warm = 1.0 + 0.0039 * (coil_k - 293.15)
+
+    assert record["valve_1.current_a"][-1] == pytest.approx(24.0 / (30.0 * warm), rel=1e-3)
+    assert float(valve.driven()["current_a"]) == pytest.approx(24.0 / (30.0 * warm))

@@ -61,6 +61,15 @@ def test_the_gain_is_that_of_python_control(rig):
     assert np.sort(np.exp(found.poles.real * DT)) == pytest.approx(np.sort(abs(poles)), rel=1e-6)
 
 
+def test_the_poles_that_are_told_are_those_of_the_law_that_runs(rig):
+    """Its integral holds the error of the sample itself."""
+    mode = driven_modes(rig)[0][1]
+    found = lq_gain(mode, RIG, 0.3, DT)
+    runs = np.linalg.eigvals(closed(mode, integral_of(found.feedback, found.integral, DT), DT))
+
+    assert np.sort(abs(np.exp(found.poles * DT))) == pytest.approx(np.sort(abs(runs)), rel=1e-9)
+
+
 def test_weights_go_by_signal_names_and_wrong_ones_are_named(rig):
     mode = driven_modes(rig)[0][1]
     with pytest.raises(InputError, match=r"rod\.positon_m: no such signal to weigh.*rod\.position"):

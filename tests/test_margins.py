@@ -19,9 +19,11 @@ from controllers.margins import (
 from controllers.positioning import STATES
 from controllers.scheduled import driven_modes
 from linearize.discrete import sampled
+from linearize.reduction import design_model
 from linearize.standard import standard_modes
 from studies.design_text import margins_text
 from workbench.contracts import Estimate
+from workbench.effects.line_delay import SOUND_M_S
 from workbench.plants.servo_drive import servo_drive
 
 DT = 2e-3
@@ -84,6 +86,16 @@ def test_the_delay_of_a_network_is_that_of_both_ways():
 
     assert unforeseen_s(crr_rig()) == pytest.approx(1e-3)
     assert both_ways_s(crr_rig()) == pytest.approx(2e-3)
+
+
+def test_a_line_delays_the_loop_as_a_network_does():
+    """5 m of tube and 14.6 ms of network are the same to a loop, and both are told as left out."""
+    drive = servo_drive()
+    tube = drive.with_values({"line_delay.length_m": 5.0})
+    network = drive.with_values({"command_delay.delay_s": 5.0 / SOUND_M_S})
+
+    assert both_ways_s(tube) == pytest.approx(both_ways_s(network)) == 5.0 / SOUND_M_S
+    assert "line_delay" in [each.what for each in design_model(tube).left_out]
 
 
 def test_disk_margins_are_those_of_python_control(hybrid):

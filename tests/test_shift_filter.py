@@ -190,6 +190,23 @@ def test_a_filter_that_knows_its_valves_learns_nothing_of_them():
     assert (np.array([found[name] for name in STRENGTHS]) == 0.0).all()
 
 
+@pytest.mark.parametrize("lost", [*PRESSURES, POSITION])
+def test_a_filter_starts_without_a_measurement_and_finds_it_afterwards(filter_, lost):
+    truth = gearbox().lean()
+    start = consistent_start(truth, {})
+    states = list(truth.state_list)
+    y = np.array([start[states.index(name)] for name in truth.measured])
+    first = np.where([name == lost for name in truth.measured], np.nan, y + 0.3 * abs(y))
+    found = filter_.start(first)
+    row = NAMES.index(lost)
+
+    assert np.isfinite(found.state).all()
+    assert found.covariance[row, row] > (50.0 * NOISE[lost]) ** 2
+    for _ in range(5):
+        found = filter_.update(found, np.zeros(2), y)
+    assert found.state[row] == pytest.approx(y[list(truth.measured).index(lost)], abs=3 * NOISE[lost])
+
+
 def test_a_filter_travels_to_another_process():
     made = ShiftFilter(
         plant=gearbox().lean(),

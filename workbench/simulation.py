@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from workbench.called import result
+from workbench.effects.timing import delay_s
 from workbench.plant import Plant
 from workbench.recording import Recording
 
@@ -14,31 +17,50 @@ AT_ONCE = 5000  # samples of one call; more run no faster and take memory
 def inputs(plant: Plant, recording: Recording) -> tuple[np.ndarray, np.ndarray]:
     """Commands and measured inputs as the plant gets them, shapes (n_u, n) and (n_d, n).
 
-    Causes in time (delay, pause) act here, on the sampled sequences.
+    Causes in time (delay, pause) act here, on the sampled sequences, in each piece by itself.
     """
-    dt = recording.sample_time_s
-
-    def prepared(channel: str) -> np.ndarray:
-        values = recording[channel]
-        for member in plant.members:
-            values = member.resample(channel, values, dt)
-        return values
-
+    dt, starts = recording.sample_time_s, recording.starts
     groups = (plant.commands, plant.measured_inputs)
-    u, d = ([prepared(signal.name) for signal in group] for group in groups)
+    u, d = (
+        [_arrived(plant, signal.name, recording[signal.name], dt, starts) for signal in group]
+        for group in groups
+    )
     n = len(recording)
     return np.reshape(u, (len(u), n)), np.reshape(d, (len(d), n))
 
 
-def received(plant: Plant, outputs: np.ndarray, sample_time_s: float) -> np.ndarray:
-    """Outputs as the computer gets them through the causes in time, shape (n_y, n)."""
-    rows = list(outputs)
-    for member in plant.members:
-        rows = [
-            member.resample(name, row, sample_time_s)
-            for name, row in zip(plant.measured, rows, strict=True)
-        ]
+def received(
+    plant: Plant, outputs: np.ndarray, sample_time_s: float, starts: Sequence[int] = (0,)
+) -> np.ndarray:
+    """Outputs as the computer gets them through the causes in time, shape (n_y, n).
+
+    ``starts`` are the first samples of pieces: nothing arrives in one that was sent in another.
+    """
+    rows = [
+        _arrived(plant, name, row, sample_time_s, starts)
+        for name, row in zip(plant.measured, outputs, strict=True)
+    ]
     return np.reshape(rows, outputs.shape)
+
+
+def _arrived(
+    plant: Plant, channel: str, sent: np.ndarray, dt: float, starts: Sequence[int]
+) -> np.ndarray:
+    """A signal (n,) behind the plant's causes in time; time runs from the start of each piece."""
+    pieces = np.split(sent, starts[1:])
+    for member in plant.members:
+        pieces = [member.resample(channel, piece, dt) for piece in pieces]
+    return np.concatenate(pieces)
+
+
+def command_delay_s(plant: Plant) -> float:
+    """How long a command is under way to the plant, the longest of several."""
+    return delay_s(plant.effects, (signal.name for signal in plant.commands))
+
+
+def output_delay_s(plant: Plant) -> float:
+    """How long an output is under way to the computer, the longest of several."""
+    return delay_s(plant.effects, plant.measured)
 
 
 def simulate(plant: Plant, recording: Recording, initial: np.ndarray | None = None) -> Recording:
@@ -63,7 +85,7 @@ def simulate(plant: Plant, recording: Recording, initial: np.ndarray | None = No
             for first, last in zip(recording.starts, ends, strict=True)
         ]
     )
-    y = received(plant, _outputs(plant, x, u, d, p), dt)
+    y = received(plant, _outputs(plant, x, u, d, p), dt, recording.starts)
     bad = ~np.isfinite(y).all(axis=0)
     if bad.any():
         raise ArithmeticError(

@@ -113,6 +113,6 @@ def bears(found: Margins) -> str:
     low, high = found.gain
     gain = "any gain above" if isinf(high) else f"gain up to {number(high, 3)} times"
     down = f", down to {number(low, 3)}" if low else ""
-    told = f"{gain}{down}, {number(degrees(found.phase_rad), 3)}° more lag, "
+    told = f"{gain}{down}, {number(degrees(found.phase_rad), 3)}° of phase, "
     told += f"{number(1e3 * found.delay_s, 3)} ms more delay"
     return f'<p class="calm" role="status">stable: {escape(told)}</p>'

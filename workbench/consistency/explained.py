@@ -24,7 +24,7 @@ from workbench.fitting.errors import in_units
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.noise import NoNoiseError, measured_noise
 from workbench.fitting.starts import long_holes, sensed_states
-from workbench.fitting.window_cuts import cut_rows, received_windows, window_firsts
+from workbench.fitting.window_cuts import begun_s, cut_rows, received_windows, window_firsts
 from workbench.fitting.window_length import window_length_s
 from workbench.fitting.window_runs import WindowRuns
 from workbench.fitting.windows import Windows
@@ -103,7 +103,7 @@ def _simulated(plant: Plant, readings: Sequence[Recording], where: Probe) -> np.
     y = runs.outputs(x0, u, d, p)
     sent = y.reshape(len(plant.measured), count, length)
     sent[:, absurd] = np.nan
-    return received_windows(plant, sent, (firsts,) * len(readings), dt)
+    return received_windows(plant, sent, begun_s(readings, (firsts,) * len(readings)), dt)
 
 
 def left_unexplained(fit: Fit) -> dict[str, float]:

@@ -57,15 +57,21 @@ class Metric:
         return self._value(row, gradient), np.clip(step, -LARGEST_STEP, LARGEST_STEP)
 
     def signature(self, row: np.ndarray) -> tuple[np.ndarray, float]:
-        """(what the nuisances cannot imitate of a change, share of it that they can)."""
+        """(what the nuisances cannot imitate of a change, share of it that they can).
+
+        The first is what a least-squares fit of the change by the nuisances leaves, its priors
+        among the rows: the products of two of them are d1'M d2, which those of M d1 and M d2 are
+        only without priors.
+        """
         flat = self._columns
         change = row.ravel()
         if not flat.shape[1]:
             return change, 0.0
-        left = change - flat @ np.linalg.solve(self.normal.hessian, flat.T @ change)
-        whole = float(change @ change)
+        moved = np.linalg.solve(self.normal.hessian, flat.T @ change)
+        left, whole = change - flat @ moved, float(change @ change)
         share = 1.0 - float(change @ left) / whole if whole > 0 else 1.0
-        return left, float(np.clip(share, 0.0, 1.0))
+        priced = np.sqrt(self.normal.precision) * moved
+        return np.concatenate([left, priced]), float(np.clip(share, 0.0, 1.0))
 
     def shown(self, row: np.ndarray) -> float:
         """What a change adds to the projected cost where nothing else is wrong: d'Md."""

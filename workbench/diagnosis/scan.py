@@ -64,7 +64,7 @@ class Trial:
 class Profile:
     """The scan of one candidate: all trials, best first, and its direction.
 
-    signature       what it does to the residual that nothing else can, (rows,)
+    signature       what it does to the residual that nothing else can, (rows + n_p,)
     compensation    share of its effect that the fitted parameters can imitate, R^2
     changes         what each trial does to the projected residual, (n_trials, rows)
     drop_wide       the drop with priors ``WIDER`` times as wide; NaN where it was not asked for

@@ -2,7 +2,8 @@
 
 The prior fit would swallow them.  With V the posterior variance of the scaled parameter at the fit
 (prior included) and t its shift in prior deviations, the recording alone would put it at
-t / (1 - V), and freeing it would lower the cost by t^2 V / (1 - V).  It is named only when it
+m = t / (1 - V) with a precision L = 1/V - 1.  The cost L (m - t)^2 + t^2 that it has at the fit is
+t^2 / (1 - V), its price included, and freeing it takes all of that away.  It is named only when it
 leaves its prior by more than three standard deviations (diagnosis.md 1.4), and judged by a refit in
 which its prior is taken away.
 """
@@ -55,7 +56,7 @@ def shifts(problem: Problem) -> list[Shift]:
         if normal.precision[k] == 0.0:  # pinned at a bound: freeing its prior moves nothing
             continue
         alone = t[k] / (1.0 - variance[k])
-        gained = t[k] ** 2 * variance[k] / (1.0 - variance[k])
+        gained = t[k] ** 2 / (1.0 - variance[k])
         drop = gained / problem.misfit
         value = float(unknowns.prior[k] + unknowns.scale[k] * alone)
         deviation = float(unknowns.scale[k] * np.sqrt(variance[k] / (1.0 - variance[k])))

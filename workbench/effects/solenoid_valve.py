@@ -142,7 +142,7 @@ class SolenoidValve(Effect):
     def driven(self) -> dict[str, Expression]:
         """Own states a long time after the command has come."""
         return {
-            "current_a": self.supply_voltage_v / self.coil_resistance_ohm,
+            "current_a": self.supply_voltage_v / self._warm_ohm,
             "armature_position_m": self.full_lift_m,
             "armature_velocity_m_s": 0.0,
         }
@@ -172,9 +172,7 @@ class SolenoidValve(Effect):
         reluctance_per_h = self.core_reluctance_per_h + gap_m / pole_h_m
         inductance_h = self.coil_turns**2 / reluctance_per_h
         slope_h_m = inductance_h / (reluctance_per_h * pole_h_m)
-        warm = 1.0 + COPPER_PER_K * (self.coil_temperature_k - COIL_REFERENCE_K)
-        across_v = self._voltage_v(own.command, current_a)
-        across_v -= self.coil_resistance_ohm * warm * current_a
+        across_v = self._voltage_v(own.command, current_a) - self._warm_ohm * current_a
         across_v -= current_a * slope_h_m * moving_m_s
         force_n = 0.5 * current_a**2 * slope_h_m + self._mechanical_n(now)
         return {
@@ -182,6 +180,12 @@ class SolenoidValve(Effect):
             "armature_position_m": own.armature_velocity_m_s,
             "armature_velocity_m_s": force_n / self.armature_mass_kg,
         }
+
+    @property
+    def _warm_ohm(self) -> Expression:
+        """Resistance of the coil at its temperature."""
+        warm = 1.0 + COPPER_PER_K * (self.coil_temperature_k - COIL_REFERENCE_K)
+        return self.coil_resistance_ohm * warm
 
     def _voltage_v(self, command: Expression, current_a: Expression) -> Expression:
         clamped = ca.fmin(ca.fmax(current_a / QUENCHED_A, -1.0), 1.0)

@@ -6,7 +6,7 @@ what arrives now was sent.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -122,3 +122,14 @@ def sent_at_s(members: Sequence[Effect], channel: str, time_s: np.ndarray) -> np
         if isinstance(member, Timing) and member.acts_on(channel) and not member.absent:
             time_s = member.sent_at_s(time_s)
     return time_s
+
+
+def delay_s(members: Sequence[Effect], channels: Iterable[str]) -> float:
+    """How late what arrives first on these channels was sent, the longest of them.
+
+    That is the constant part of all causes in time: a pause comes later, and a drift grows from
+    nothing.
+    """
+    begin_s = np.zeros(1)
+    delays = (float((begin_s - sent_at_s(members, c, begin_s))[0]) for c in channels)
+    return max(delays, default=0.0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -239,12 +239,3 @@ class StuckBand(Effect):
             return value
         below = ca.fmax(self.neutral - value, 0.0)
         return value + below * shut_while_stuck(below / self.span, self.band_share)
-
-
-def command_delay_s(effects: Iterable[Effect]) -> float:
-    """How long a command is under way, the longest of several."""
-    delays: dict[str, float] = {}
-    for effect in effects:
-        if isinstance(effect, CommandDelay):
-            delays[effect.signal] = delays.get(effect.signal, 0.0) + float(effect.delay_s)
-    return max(delays.values(), default=0.0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -66,17 +66,28 @@ def cut_inputs(
     return u, d
 
 
+def begun_s(
+    recordings: Sequence[Recording], firsts: tuple[tuple[int, ...], ...]
+) -> np.ndarray:
+    """Time of each window's first sample from the start of its piece, shape (n_windows,)."""
+    return np.concatenate([_begun_s(*each) for each in zip(recordings, firsts, strict=True)])
+
+
+def _begun_s(recording: Recording, firsts: tuple[int, ...]) -> np.ndarray:
+    starts, own = np.array(recording.starts), np.array(firsts, dtype=int)
+    return recording.sample_time_s * (own - starts[np.searchsorted(starts, own, "right") - 1])
+
+
 def received_windows(
-    plant: Plant, outputs: np.ndarray, firsts: tuple[tuple[int, ...], ...], sample_time_s: float
+    plant: Plant, outputs: np.ndarray, begun_s: np.ndarray, sample_time_s: float
 ) -> np.ndarray:
     """Outputs (n_y, n_windows, L) as the computer gets them through the causes in time.
 
-    What was sent shortly before a window is extrapolated from its first two samples.
+    ``begun_s``, shape (n_windows,), is when windows begin.  What was sent shortly before a window
+    is extrapolated from its first two samples.
     """
     length = outputs.shape[2]
-    begin_s = (
-        sample_time_s * np.concatenate([np.array(own, dtype=float) for own in firsts])[:, None]
-    )
+    begin_s = begun_s[:, None]
     time_s = begin_s + sample_time_s * np.arange(length)
     found = outputs.copy()
     for row, name in enumerate(plant.measured):

@@ -20,6 +20,7 @@ import numpy as np
 from workbench.effect import Effect
 from workbench.fitting.error_model import OUTLYING, ErrorModel, error_model
 from workbench.fitting.window_cuts import (
+    begun_s,
     cut_inputs,
     cut_rows,
     evenly,
@@ -182,9 +183,9 @@ class Windows:
         y = self._runs.outputs(x0, u, d, p)
         n_y, n = len(self.plant.measured), len(self)
         sent = y.reshape(n_y, len(plants), n, self.length).transpose(1, 0, 2, 3)
-        dt = self.recordings[0].sample_time_s
+        dt, begun = self.recordings[0].sample_time_s, begun_s(self.recordings, self.firsts)
         found = [
-            received_windows(plant, one, self.firsts, dt)
+            received_windows(plant, one, begun, dt)
             for plant, one in zip(plants, sent, strict=True)
         ]
         return np.array(found)
