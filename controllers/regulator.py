@@ -151,7 +151,7 @@ def axis_regulator(hybrid: HybridModel, spec: AxisLqSpec | None = None) -> Regul
 
 
 def regulator(hybrid: HybridModel, spec: RegulatorSpec) -> Regulator:
-    """LQ designs on every mode in which the valve drives the plant's only axis; see below."""
+    """As :func:`regulator_on`, of the plant's only axis."""
     return regulator_on(hybrid, axis_of(hybrid.plant), spec)
 
 

@@ -88,14 +88,6 @@ class Mode:
     @property
     def system(self) -> control.StateSpace:
         """The linear part in SI units with named signals; each dot of a name is a colon."""
-        return self._system(self.A, self.B, self.C)
-
-    @property
-    def scaled_system(self) -> control.StateSpace:
-        """The linear part with every state in units of its scale, inputs and outputs in SI."""
-        return self._system(*self.scaled)
-
-    def _system(self, A: np.ndarray, B: np.ndarray, C: np.ndarray) -> control.StateSpace:
         import control
 
         labels = {
@@ -103,7 +95,7 @@ class Mode:
             "inputs": _labels(self.command_names),
             "outputs": _labels(self.output_names),
         }
-        return control.ss(A, B, C, self.D, name=self.name, **labels)
+        return control.ss(self.A, self.B, self.C, self.D, name=self.name, **labels)
 
     def sent(self, model: DesignModel, command: np.ndarray) -> np.ndarray:
         """All commands of the model, (n_u,): the mode's own, and switches at their level."""

@@ -32,7 +32,6 @@ HALF_WINDOW, RESTING_M_S = 5, 1e-3  # a slide rests where it moves less than thi
 SLIDES = ("slide -", "stick", "slide +")
 VALVES = ("1 vents 2 vents", "1 vents 2 charges", "1 charges 2 vents", "1 charges 2 charges")
 GEARBOX_PRESSURES = ("chamber_1.pressure_pa", "chamber_2.pressure_pa")
-SPOOL = ("vents", "shut", "fills")
 
 
 @dataclass(frozen=True)

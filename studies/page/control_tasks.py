@@ -57,7 +57,6 @@ class Linearised:
 class Looped:
     """A design, what is known of it piece by piece, and its closed loops."""
 
-    design_file: str
     told: tuple[str, ...] = field(repr=False)
     check: Checked = field(repr=False)
     drawn: Mapping[str, str] = field(repr=False)
@@ -127,4 +126,4 @@ def close_loops(
     write_design(found, path)
     loops = loops_of(rig, {path: path.read_text(encoding="utf-8")}, estimators, scenarios)
     checked = recorded_runs(loops, runs, say)
-    return Looped(target, told, checked, drawings(styled_figures(checked)))
+    return Looped(told, checked, drawings(styled_figures(checked)))
