@@ -88,8 +88,7 @@ def test_a_shift_says_how_far_the_cost_falls_where_its_prior_is_taken_away():
     freed[k, k] -= normal.precision[k]
     gradient[k] -= normal.precision[k] * t[k]
     gained = [
-        g @ np.linalg.solve(H, g)
-        for H, g in ((normal.hessian, normal.gradient), (freed, gradient))
+        g @ np.linalg.solve(H, g) for H, g in ((normal.hessian, normal.gradient), (freed, gradient))
     ]
     fall = t[k] ** 2 * normal.precision[k] + gained[1] - gained[0]
 

@@ -204,7 +204,9 @@ def test_a_filter_starts_without_a_measurement_and_finds_it_afterwards(filter_, 
     assert found.covariance[row, row] > (50.0 * NOISE[lost]) ** 2
     for _ in range(5):
         found = filter_.update(found, np.zeros(2), y)
-    assert found.state[row] == pytest.approx(y[list(truth.measured).index(lost)], abs=3 * NOISE[lost])
+    assert found.state[row] == pytest.approx(
+        y[list(truth.measured).index(lost)], abs=3 * NOISE[lost]
+    )
 
 
 def test_a_filter_travels_to_another_process():

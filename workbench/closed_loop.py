@@ -125,7 +125,8 @@ def close_loop(
     every = _ticks(controller, estimator, sample_time_s)
     hardware = hardware or Hardware()
     n = len(next(iter(reference.values())))
-    ahead = _ahead(reference, afterwards or {}, controller.preview * every)
+    wanted = _wanted(reference, afterwards or {})
+    preview = every * np.arange(controller.preview)
     normal = np.random.default_rng(seed).standard_normal((n, len(plant.measured)))
     plant_step = _Plant(plant, sample_time_s, n)
     x = np.array(plant.initial if initial is None else initial, dtype=float)
@@ -139,8 +140,9 @@ def close_loop(
             estimate = estimator.start(seen) if estimate is None else estimate
             estimate = estimator.update(estimate, command.value, seen)
             known = perf_counter()
-            coming = ahead[:, k::every][:, : controller.preview]
-            command = controller.step(command, coming, estimate)
+            coming = k + round(estimate.ahead_s / sample_time_s) + preview
+            looked = wanted[:, np.clip(coming, 0, wanted.shape[1] - 1)]
+            command = controller.step(command, looked, estimate)
             done = perf_counter()
             command = replace(command, value=hardware.sent(plant, command.value))
             ticks.append((done - known, known - begun, {**estimate.notes, **command.notes}))
@@ -149,12 +151,11 @@ def close_loop(
     return _record(plant, reference, sample_time_s, rows, ticks, estimate.names)
 
 
-def _ahead(
-    reference: Mapping[str, np.ndarray], afterwards: Mapping[str, np.ndarray], samples: int
+def _wanted(
+    reference: Mapping[str, np.ndarray], afterwards: Mapping[str, np.ndarray]
 ) -> np.ndarray:
-    """The reference and at least so many samples after it, a row for each name."""
-    rows = [np.append(row, afterwards.get(name, ())) for name, row in reference.items()]
-    return np.pad(np.array(rows), ((0, 0), (0, samples)), mode="edge")
+    """The reference and how it goes on after it, a row for each name."""
+    return np.array([np.append(row, afterwards.get(name, ())) for name, row in reference.items()])
 
 
 def _ticks(controller: Controller, estimator: Estimator, sample_time_s: float) -> int:

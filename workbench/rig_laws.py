@@ -36,8 +36,9 @@ from workbench.effects.law_features import written as written_as
 from workbench.gas_volume import GasVolume
 from workbench.linkage import JointRod
 from workbench.parts import Atmosphere, Body, HeldRod, PressureFace, Supply
-from workbench.plant import Plant, Signal
+from workbench.plant import Plant
 from workbench.rig_text import RigText, quoted
+from workbench.simulation import arriving_at_rest
 from workbench.units import UnitError, public_name, quantity, written
 
 PREFIX = "law["
@@ -97,7 +98,7 @@ def _flows(plant: Plant, part: GasVolume) -> Iterator[Effect]:
     for outside in _outside(plant):
         moved = [(MOVED_FLOWS, {"body": body})] if body else []
         single = len(plant.commands) == 1
-        commanded = [(COMMANDED_FLOWS, _command(plant.commands[0]))] if single else []
+        commanded = [(COMMANDED_FLOWS, _command(plant))] if single else []
         for features, more in ((GAUGE_FLOWS, {}), *moved, *commanded):
             for feature in features:
                 name = _written(feature, part.name)
@@ -109,11 +110,12 @@ def _outside(plant: Plant) -> list[str]:
     return [part.name for part in plant.parts if isinstance(part, Atmosphere)][:1]
 
 
-def _command(signal: Signal) -> dict[str, Any]:
-    """A command as a share of its range to either side of where it rests."""
+def _command(plant: Plant) -> dict[str, Any]:
+    """The only command as a share of its range to either side of where it rests."""
+    (signal,) = plant.commands
     sides = [abs(end - signal.nominal) for end in (signal.lower, signal.upper)]
     span = max((side for side in sides if 0.0 < side < inf), default=1.0)
-    return {"command": signal.name, "rest": signal.nominal, "span": span}
+    return {"command": signal.name, "rest": arriving_at_rest(plant)[signal.name], "span": span}
 
 
 def _written(feature: Feature, place: str) -> str:

@@ -53,6 +53,16 @@ def _arrived(
     return np.concatenate(pieces)
 
 
+def arriving_at_rest(plant: Plant) -> dict[str, float]:
+    """Each command as it arrives, behind all that alters it, where the plant rests.
+
+    That is what the valve itself rests at: a valve offset by 0.25 V rests at 5.25 V of its command.
+    """
+    names = [signal.name for signal in plant.commands]
+    found = plant.model.quantities(*names)(plant.initial, *plant.nominal).full().ravel()
+    return dict(zip(names, found.tolist(), strict=True))
+
+
 def command_delay_s(plant: Plant) -> float:
     """How long a command is under way to the plant, the longest of several."""
     return delay_s(plant.effects, (signal.name for signal in plant.commands))

@@ -18,6 +18,7 @@ from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.starts import guessed_states
 from workbench.plant import Plant, Signal
 from workbench.recording import Recording
+from workbench.simulation import arriving_at_rest
 from workbench.units import display_scale, display_unit
 
 OPEN_SHARE = 1e-3  # of the range of a command, behind the dead zone
@@ -98,15 +99,15 @@ def _valve_sides(course: Course) -> dict[str, np.ndarray]:
     """Sides of each command as it arrives behind all that alters it, dead zone included."""
     plant = course.plant
     arriving = (plant.model.conditions.read(signal.name) for signal in plant.commands)
-    found: dict[str, np.ndarray] = {}
+    rest, found = arriving_at_rest(plant), {}
     for signal, command in zip(plant.commands, course.along(*arriving), strict=True):
-        found |= _sides(signal, command, _moves_gas(plant, signal))
+        found |= _sides(signal, command - rest[signal.name], _moves_gas(plant, signal))
     return found
 
 
-def _sides(signal: Signal, command: np.ndarray, valve: bool) -> dict[str, np.ndarray]:
+def _sides(signal: Signal, away: np.ndarray, valve: bool) -> dict[str, np.ndarray]:
+    """Sides by how far ``away`` from its rest a command arrives, named by where it rests."""
     member = signal.name.rpartition(".")[0]
-    away = command - signal.nominal
     span = signal.upper - signal.lower
     closed = OPEN_SHARE * (span if np.isfinite(span) else 1.0)
     if signal.levels:

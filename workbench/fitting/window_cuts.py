@@ -66,9 +66,7 @@ def cut_inputs(
     return u, d
 
 
-def begun_s(
-    recordings: Sequence[Recording], firsts: tuple[tuple[int, ...], ...]
-) -> np.ndarray:
+def begun_s(recordings: Sequence[Recording], firsts: tuple[tuple[int, ...], ...]) -> np.ndarray:
     """Time of each window's first sample from the start of its piece, shape (n_windows,)."""
     return np.concatenate([_begun_s(*each) for each in zip(recordings, firsts, strict=True)])
 

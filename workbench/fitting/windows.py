@@ -185,8 +185,7 @@ class Windows:
         sent = y.reshape(n_y, len(plants), n, self.length).transpose(1, 0, 2, 3)
         dt, begun = self.recordings[0].sample_time_s, begun_s(self.recordings, self.firsts)
         found = [
-            received_windows(plant, one, begun, dt)
-            for plant, one in zip(plants, sent, strict=True)
+            received_windows(plant, one, begun, dt) for plant, one in zip(plants, sent, strict=True)
         ]
         return np.array(found)
 

@@ -10,6 +10,8 @@ import numpy as np
 DIFFERENCE = 1e-3  # of the scale of an unknown: the integrator chooses its steps by the state
 ROOM = 0.1  # of the scale: a start stays that far inside its bounds
 MOST_EVALUATIONS = 60
+WEIGHINGS = 5  # of priors beside residuals, as large as the last search left them
+SAME_SIZE = 0.1  # of a mean square: closer is the same
 
 
 @dataclass(frozen=True)
@@ -46,28 +48,52 @@ def solve(
     """Least squares of residuals in one unit, whose smallest standard deviation is ``noise``.
 
     The covariance is that of the residuals' own size, at least the noise, times the number of
-    samples over which they are correlated: 1 000 samples of a slow error are worth a few.
+    samples over which they are correlated: 1 000 samples of a slow error are worth a few.  Priors
+    are weighed against residuals of that size, so that the search begins again where it turns out
+    another one than before.
 
     Raises
     ------
     ArithmeticError
         If the residuals are not finite at the start, or the search does not come to an end.
     """
-    from scipy.optimize import least_squares
-
     start, scale = (np.array([getattr(u, k) for u in unknowns]) for k in ("start", "scale"))
     lower, upper = (np.array([getattr(u, k) for u in unknowns]) for k in ("lower", "upper"))
-    known = noise / np.array([u.prior_deviation for u in unknowns])
-
-    def weighed(t: np.ndarray) -> np.ndarray:
-        x = start + scale * t
-        return np.concatenate([residuals(x), known * (x - start)])
-
+    priors = scale / np.array([u.prior_deviation for u in unknowns])
     bounds = (lower - start) / scale, (upper - start) / scale
     # From a bound itself the method creeps: it counts how far away the bound is.
     begun = np.clip(0.0, bounds[0] + ROOM, np.maximum(bounds[1] - ROOM, bounds[0] + ROOM))
-    if not np.isfinite(weighed(begun)).all():
+    if not np.isfinite(residuals(start + scale * begun)).all():
         raise ArithmeticError("the model is not finite at the rig's own values")
+    size = noise**2
+    for _ in range(WEIGHINGS):
+        weighed_by = size
+        t, left, rows = _searched(
+            lambda t: residuals(start + scale * t), priors * np.sqrt(size), begun, bounds
+        )
+        worth = max(len(left) - len(start), 1)
+        size = max(float(left @ left) / worth, noise**2) * correlation_samples(left)
+        if not priors.any() or abs(size - weighed_by) < SAME_SIZE * weighed_by:
+            break
+        begun = t
+    information = rows.T @ rows / size + np.diag(priors**2)
+    covariance = np.linalg.pinv(information) * np.outer(scale, scale)
+    unseen = np.diag(information) == 0.0  # what no residual depends on is not known at all
+    covariance[unseen, unseen] = np.inf
+    return Solution(start + scale * t, covariance, left)
+
+
+def _searched(
+    residuals: Callable[[np.ndarray], np.ndarray],
+    priors: np.ndarray,
+    begun: np.ndarray,
+    bounds: tuple[np.ndarray, np.ndarray],
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Unknowns (n,) in their scale, the residuals (m,) they leave, and their slopes (m, n)."""
+    from scipy.optimize import least_squares
+
+    def weighed(t: np.ndarray) -> np.ndarray:
+        return np.concatenate([residuals(t), priors * t])
 
     def slopes(t: np.ndarray) -> np.ndarray:
         """Differences away from the nearer bound, over one step for all."""
@@ -87,15 +113,8 @@ def solve(
     )
     if not found.success:
         raise ArithmeticError(f"least squares did not converge in {MOST_EVALUATIONS} evaluations")
-    left = found.fun[: len(found.fun) - len(start)]
-    worth = max(len(left) - len(start), 1)
-    size = max(float(left @ left) / worth, noise**2) * correlation_samples(left)
-    rows, priors = found.jac[: len(left)], np.diag((known * scale / noise) ** 2)
-    information = rows.T @ rows / size + priors
-    covariance = np.linalg.pinv(information) * np.outer(scale, scale)
-    unseen = np.diag(information) == 0.0  # what no residual depends on is not known at all
-    covariance[unseen, unseen] = np.inf
-    return Solution(start + scale * found.x, covariance, left)
+    m = len(found.fun) - len(priors)
+    return found.x, found.fun[:m], found.jac[:m]
 
 
 def correlation_samples(residuals: np.ndarray) -> float:

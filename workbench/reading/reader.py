@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ from workbench.reading.text_table import text_table
 from workbench.recording import Recording
 from workbench.recording_format import derived_channels
 from workbench.rig import Rig
-from workbench.units import public_name, scale
+from workbench.units import UnitError, public_name, scale
 
 
 def read_recording(rig: Rig, path: Path | str) -> Recording:
@@ -35,6 +36,7 @@ def read_recording(rig: Rig, path: Path | str) -> Recording:
     path = Path(path)
     table = matlab_table(path) if path.suffix.lower() == ".mat" else text_table(path, rig.reader)
     columns = _columns(rig, table)
+    _require_units(rig, table, columns)
     numbers = sorted(set(columns.values()))
     raw = dict(zip(numbers, table.load(numbers), strict=True))
     time_s = _time(rig, table, raw, columns)
@@ -108,6 +110,24 @@ def _columns(rig: Rig, table: Table) -> dict[str, int]:
     if wrong:
         raise InputError(*wrong)
     return found
+
+
+def _require_units(rig: Rig, table: Table, columns: dict[str, int]) -> None:
+    """Refuse a row of units that says another one than the rig; what is no unit says nothing."""
+    wrong = []
+    for name, number in columns.items():
+        told = table.units[number] if number < len(table.units) else ""
+        unit = rig.reader.time.unit if name == "time" else rig.reader.channels[name].unit
+        quantity = "time_s" if name == "time" else name
+        with suppress(UnitError):
+            if told and scale(told, quantity) != scale(unit, quantity):
+                what = f"the row of units says {told}, the rig {unit or 'none'}"
+                expected = (
+                    f"unit = '{told}' in the rig's [recording], or {unit or 'none'} in the file"
+                )
+                wrong.append(Message(what, public_name(name), expected, file=table.file))
+    if wrong:
+        raise InputError(*wrong)
 
 
 def _time(

@@ -22,6 +22,7 @@ class Table:
     names   what the columns are called; empty where they are only numbered
     load    the columns with these numbers (from 0), shape (n_columns, n_rows)
     place   where a row (from 0) stands in the file, for people: ``line 17``
+    units   what the file says the columns are in; empty where it has no row of units
     """
 
     file: str
@@ -29,6 +30,7 @@ class Table:
     n_columns: int
     load: Callable[[Sequence[int]], np.ndarray]
     place: Callable[[int], str]
+    units: Sequence[str] = ()
 
     def find(self, column: str | int, channel: str) -> int | Message:
         """The number of a column from 0, or what is wrong with asking for it."""

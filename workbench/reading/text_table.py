@@ -53,8 +53,9 @@ def text_table(path: Path, reader: RecordingFormat) -> Table:
     if head and _numeric(head[1]):
         what = "the first row holds numbers, not the names of columns"
         raise InputError(Message(what, expected="header = false", file=file, line=head[0]))
+    units = None
     if head and data and not any(_numeric(word) for word in re.split(r"[;,\t| ]+", data[0][1])):
-        data = data[1:]  # the row of units
+        units, data = data[0][1], data[1:]
     if not data:
         raise InputError(Message("there are names of columns but no rows of numbers", file=file))
     sample = [line for _, line in data[:LOOKED_AT]]
@@ -64,7 +65,8 @@ def text_table(path: Path, reader: RecordingFormat) -> Table:
     names = _names(head[1], separator) if head else []
     n_columns = max(len(names), len(_cells(body[0], separator)))
     load = partial(_load, body=body, separator=separator, file=file, numbers=numbers)
-    return Table(file, names, n_columns, load, lambda row: f"line {numbers[row]}")
+    told = [word.strip("[]()") for word in _names(units, separator)] if units else []
+    return Table(file, names, n_columns, load, lambda row: f"line {numbers[row]}", told)
 
 
 def decoded(content: bytes) -> str:

@@ -22,8 +22,9 @@ def write_recording(
 ) -> None:
     """A recording as CSV: a row of names, a row of units, then the samples.
 
-    ``units`` by channel (full or public name) replace the units people usually read.  A default
-    rig of the plant reads the file back; where the recording has pieces, with ``gaps = "split"``.
+    ``units`` by channel (full or public name) replace the units people usually read.  Without them
+    a default rig of the plant reads the file back; where the recording has pieces, with
+    ``gaps = "split"``.
     The file appears only once it is complete.
     """
     names = list(recording.channels)
