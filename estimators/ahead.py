@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
 from workbench.contracts import Estimate
@@ -50,20 +49,32 @@ class Ahead:
         sent = (*sent[1:], command)
         late = self.delay_s / self.sample_time_s
         now = self.inner.update(before, self._at(sent, -late), measurement)
-        (_, d, p), (x, places) = self.plant.nominal, self._whole(now)
-        whole = int(late + SLACK)
-        for k in range(1, whole + 1):
-            x = self._step(self.sample_time_s)(x, self._at(sent, k - late), d, p).full().ravel()
-        if late - whole > SLACK:
-            rest_s = self.delay_s - whole * self.sample_time_s
-            x = self._step(rest_s)(x, sent[-1], d, p).full().ravel()
-        return self._handed_on(now, x[places], (now, sent))
+        own = set(now.names) - set(self.plant.model.states)
+        carried = self._by_the_estimator if own else self._by_the_plant
+        return self._handed_on(now, carried(now, sent, late), (now, sent))
 
     def _handed_on(self, now: Estimate, state: np.ndarray, memory: Any) -> Estimate:
         return replace(now, state=state, memory=memory, ahead_s=self.delay_s - self.sensors_s)
 
-    def _step(self, time_s: float) -> ca.Function:
-        return self.plant.model.step(time_s)
+    def _by_the_plant(self, now: Estimate, sent: tuple[np.ndarray, ...], late: float) -> np.ndarray:
+        """The state so many samples later, between two samples too."""
+        step, (_, d, p), (x, places) = self.plant.model.step, self.plant.nominal, self._whole(now)
+        whole = int(late + SLACK)
+        for k in range(1, whole + 1):
+            x = step(self.sample_time_s)(x, self._at(sent, k - late), d, p).full().ravel()
+        if late - whole > SLACK:
+            rest_s = self.delay_s - whole * self.sample_time_s
+            x = step(rest_s)(x, sent[-1], d, p).full().ravel()
+        return x[places]
+
+    def _by_the_estimator(
+        self, now: Estimate, sent: tuple[np.ndarray, ...], late: float
+    ) -> np.ndarray:
+        """Of one with states that the plant does not have: it predicts, by the nearest sample."""
+        nothing = np.full(len(self.plant.measured), np.nan)
+        for k in range(1, int(late + 0.5) + 1):
+            now = self.inner.update(now, self._at(sent, k - late), nothing)
+        return now.state
 
     def _whole(self, now: Estimate) -> tuple[np.ndarray, list[int]]:
         """The plant's state with what is estimated, and the places of that; the rest follows."""

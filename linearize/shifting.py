@@ -19,6 +19,7 @@ from workbench.effect import Effect
 from workbench.effects.detent import Detent
 from workbench.effects.solenoid_valve import SolenoidValve
 from workbench.effects.stribeck_friction import StribeckFriction
+from workbench.effects.timing import Timing
 from workbench.effects.wall_heat import ConstantWallHeat
 from workbench.plant import Plant, Signal
 from workbench.plants.gearbox import FLOATING, MAIN
@@ -102,12 +103,12 @@ def shift_model(plant: Plant, omitted: tuple[Omission, ...] = OMITTED) -> Design
     Without ``COULOMB`` among what is omitted, dry friction stays: at a point that slides it is a
     constant of the drift, with the sign of the direction.
     """
-    return _reduced(fed_by_flows(plant.lean()), REPLACED, omitted)
+    return _reduced(fed_by_flows(plant.lean()), (REPLACED, *_late(plant)), omitted)
 
 
 def switched_shift_model(plant: Plant, omitted: tuple[Omission, ...] = OMITTED) -> DesignModel:
     """The gearbox on (p1, p2, x, v), with the commands of the valves, each 0 or 1."""
-    return _reduced(plant.lean(), SWITCHED, omitted)
+    return _reduced(plant.lean(), (SWITCHED, *_late(plant)), omitted)
 
 
 def driving_model(plant: Plant) -> DesignModel:
@@ -116,7 +117,7 @@ def driving_model(plant: Plant) -> DesignModel:
     For longer than a shift: dry friction and detent hold the piston between shifts, and gas that
     expands through a valve cools by some 80 K.
     """
-    whole = _reduced(fed_by_flows(plant.lean()), REPLACED, ())
+    whole = _reduced(fed_by_flows(plant.lean()), (REPLACED, *_late(plant)), ())
     left_out = tuple(item for item in whole.left_out if item is not GAS)
     return replace(whole, states=(*PRESSURES, *MASSES, POSITION, VELOCITY), left_out=left_out)
 
@@ -138,11 +139,13 @@ def _push(model: DesignModel, place_m: float) -> float:
     return float(model.jacobians(x, [0.0, 0.0])[0][row, column])
 
 
-def _reduced(plant: Plant, valves: LeftOut, omitted: tuple[Omission, ...]) -> DesignModel:
+def _reduced(
+    plant: Plant, valves: tuple[LeftOut, ...], omitted: tuple[Omission, ...]
+) -> DesignModel:
     return DesignModel(
         plant=plant,
         states=STATES,
-        left_out=(valves, *RIGID, GAS, *(each.left_out for each in omitted), *_slow(plant)),
+        left_out=(*valves, *RIGID, GAS, *(each.left_out for each in omitted), *_slow(plant)),
         nulls=dict(pair for each in omitted for pair in each.nulls(plant)),
         couplings=tuple(couplings(plant)),
     )
@@ -153,3 +156,10 @@ def _slow(plant: Plant) -> Iterator[LeftOut]:
     for effect in plant.effects:
         if [*effect.states()] and not isinstance(effect, SolenoidValve):
             yield LeftOut(effect.name, "without its own state", "no part of a shift of 20 ms")
+
+
+def _late(plant: Plant) -> Iterator[LeftOut]:
+    """Delays of a user's plant, which go with the valves whose commands they delay."""
+    for effect in plant.effects:
+        if isinstance(effect, Timing) and not effect.absent:
+            yield LeftOut(effect.name, "no delay", "acts on samples; the filter looks ahead by it")

@@ -4,8 +4,8 @@ A shift is fast if it settles in 1.25 times the time of the open loop, which dri
 soft if it lands with half of its speed, or 0.5 m/s; and no shift to Neutral goes past it by 0.5 mm.
 The open loop is run on the same plant, so that the bounds follow a drawn plant and its supply.
 
-Noise by physics.md section 2; the filter's process noise is chosen, large enough for a supply that
-is off by a bar and for friction that is off by half.
+Noise by physics.md section 2; the filter's process noise is chosen for a supply that is off by a
+bar and friction by half.
 """
 
 from __future__ import annotations
@@ -18,12 +18,13 @@ from math import nan
 import numpy as np
 
 from controllers.shift_prediction import drives
+from estimators.ahead import in_time
 from estimators.shift_filter import ShiftFilter
 from linearize.shift_sample import half_stroke_m
 from linearize.shifting import POSITION, PRESSURES, VELOCITY
 from studies.text import clock, columns, number, until
 from workbench.closed_loop import Hardware, LoopRecord, close_loop
-from workbench.contracts import Command, Controller, Estimate
+from workbench.contracts import Command, Controller, Estimate, Estimator
 from workbench.filtering import consistent_start
 from workbench.plant import Plant
 from workbench.plants.gearbox import COMMANDS, FINGER_M, FLOATING, MAIN
@@ -180,15 +181,16 @@ def _beside(record: LoopRecord, open_loop: LoopRecord) -> LoopRecord:
 
 
 @cache
-def shift_filter(plant: Plant, sample_time_s: float, strength: float = 1.0) -> ShiftFilter:
-    """The estimator of a plant, made once: its valves take longer than a shift."""
-    return ShiftFilter(
+def shift_filter(plant: Plant, sample_time_s: float, strength: float = 1.0) -> Estimator:
+    """The estimator of a plant, made once; where commands come late it hands on what they meet."""
+    found = ShiftFilter(
         plant=plant,
         sample_time_s=sample_time_s,
         measurement_noise=NOISE,
         process_noise=PROCESS,
         strength=strength,
     )
+    return in_time(found, plant)
 
 
 def valves_off(rig: Rig) -> float:
@@ -205,7 +207,7 @@ def valves_off(rig: Rig) -> float:
 
 
 def run(
-    plant: Plant, controller: Controller, estimator: ShiftFilter, scenario: str, seed: int
+    plant: Plant, controller: Controller, estimator: Estimator, scenario: str, seed: int
 ) -> LoopRecord:
     """One shift from rest, vented, with the noise of the sensors."""
     start, target = (share * half_stroke_m(plant) for share in SHIFTS[scenario])

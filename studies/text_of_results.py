@@ -208,9 +208,10 @@ def unit_names(outputs: tuple[str, ...]) -> dict[str, str]:
 
 def addition_text(found: Addition, unit_of: Mapping[str, str]) -> str:
     """Errors before and after on both sets, and the parameters that moved."""
-    drops = f"misfit removed: {removed(found.drop_train)} of training"
+    drops = f"weighted misfit removed: {removed(found.drop_train)} of training"
     if isfinite(found.drop_validation):
         drops += f", {removed(found.drop_validation)} of {found.evidence.value}"
+    drops += "\nweighted by the noise and by what a fit without the effect cannot follow"
     parameters = moved_text(found.parameters)
     errors = before_after_text(found.before, found.after, unit_of, ADDED)
     windows = windows_text(found.fit, found.validation_fit)

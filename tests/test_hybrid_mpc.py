@@ -8,11 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from controllers.design_file import design, read_design, write_design
-from controllers.hybrid_mpc import HybridMpcSpec
+from controllers.hybrid_mpc import HybridMpcSpec, hybrid_mpc
 from controllers.shift_prediction import query
 from controllers.switching_plans import NEVER, flips, plans, switching_times
 from linearize.shift_sample import half_stroke_m, one_sample, softened
 from linearize.shifting import STATES
+from linearize.standard import standard_modes
 from linearize.valve_response import (
     BEFORE,
     MASK,
@@ -271,3 +272,15 @@ def test_the_commands_design_and_check_a_gearbox(tmp_path):
     answer = call("check", rig, made, "--estimator", "ekf")
     assert answer.exit_code == 2
     assert "leave --estimator out" in answer.stderr
+
+
+@pytest.mark.parametrize("scenario", ["h-n", "l-n"])
+def test_shifts_to_neutral_are_made_behind_a_network_that_is_known(scenario):
+    """3 ms late, the piston would go 2.6 mm past Neutral and land with 1.1 m/s and more."""
+    late = {f"command_delay@valve_{k}.delay_s": 3e-3 for k in (1, 2)}
+    plant = gearbox().with_values(late)
+    hybrid = standard_modes(plant)
+    found = check_shifts(plant, {"mpc": hybrid_mpc(hybrid)}, [scenario])
+
+    assert found.rows[0].reached
+    assert "command_delay@valve_1" in [each.what for each in hybrid.model.left_out]

@@ -125,7 +125,7 @@ def test_an_error_below_the_noise_is_no_more_than_the_whole_misfit_gone():
     assert document["ranking"][0]["error_drop_validation"] == 1.0
     text = diagnosis_text(replace(found, ranking=rows), UNITS)
     assert re.search(r"chamber_leak@chamber_a +100\.0 % +100\.0 %", text)
-    assert "removes 100% of the misfit" in sentence(Verdict.FOUND, rows, None)
+    assert "removes 100% of the weighted misfit" in sentence(Verdict.FOUND, rows, None)
 
 
 def test_what_is_no_number_is_null_in_json():

@@ -61,8 +61,8 @@ class MissingTab:
         self._save.visible = False
         return column(
             guide("Ask which physical effect of the catalogue would explain what the plant misses; "
-                  "a bar is the share of the misfit that goes away, orange on recordings that were "
-                  "not fitted."),
+                  "a bar is the share of the weighted misfit that goes away, orange on recordings "
+                  "that were not fitted."),
             row(diagnose),
             self._said,
             self._bars,
@@ -123,7 +123,7 @@ def _bars(rows: tuple[Ranked, ...]) -> Any:
     tied = {leader.candidate.name, *leader.tied_with} if leader.tied_with else set()
     names = [label_of(each, tied) for each in rows]
     found = chart(
-        "drop of the misfit beyond noise (%)", "", 90 + BAR * len(rows), "expected fall",
+        "fall of the weighted misfit (%)", "", 90 + BAR * len(rows), "expected fall",
         max_width=900,
         y_range=FactorRange(*reversed(names)), x_range=(0, 105), tools="",
     )  # fmt: skip

@@ -280,7 +280,7 @@ def addition(
     if is_law(candidate.name):
         kind = f"empirical, not a physical effect, seen for {ranges_text(found.seen)}; "
     trained, held = f"{told(share):.0%}", f"{told(unseen):.0%}"
-    falls = f"misfit beyond noise {trained} smaller in training, {held} in {evidence.value}"
+    falls = f"weighted misfit {trained} smaller in training, {held} in {evidence.value}"
     return Addition(
         rig=replace(found, notes=(*rig.notes, f"{candidate.name}: {kind}{falls}")),
         candidate=candidate,

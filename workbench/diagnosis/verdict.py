@@ -112,8 +112,8 @@ def _said(verdict: Verdict, ranking: tuple[Ranked, ...], law: Law | None) -> str
     name, share = _spoken(leader), f"{told(leader.drop_train):.0%}"
     if verdict is Verdict.FOUND:
         if len(leader.candidate.singles) > 1:
-            return f"{name} are missing: they remove {share} of the misfit beyond noise"
-        return f"{name} is missing: it removes {share} of the misfit beyond noise"
+            return f"{name} are missing: they remove {share} of the weighted misfit"
+        return f"{name} is missing: it removes {share} of the weighted misfit"
     if verdict is Verdict.SMALL_PROXY:
         return f"{name} explains {share} of the misfit and may stand for something else"
     if not leader.tied_with:
