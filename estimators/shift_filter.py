@@ -73,7 +73,8 @@ class ShiftFilter:
         Standard deviation that each of the four states gains per square root of a second.
     strength
         Standard deviation of the strength of a valve before anything is seen: 1 as the plant has
-        it, less where its valves were measured or fitted.
+        it, less where its valves were measured or fitted.  What else sets valves apart, and the
+        gains of their flows, stay as uncertain as of any valve.
     """
 
     plant: Plant
