@@ -19,7 +19,7 @@ from math import tau
 
 import numpy as np
 
-from controllers.lq import gain_of, with_integral
+from controllers.lq import gain_of
 from controllers.margins import Law, integral_of
 from controllers.motion import PREVIEW
 from controllers.positioning import (
@@ -170,5 +170,5 @@ def cascade_gain(mode: Mode, area_m2: float, spec: CascadeSpec) -> CascadeGain:
     outer = mass_kg * np.array([w**2, damping, w**2 / spec.integral_time_s])
     gain = CascadeGain(tau * spec.force_bandwidth_hz / rise, -taken / rise, outer, np.zeros(0))
     K = np.array([*gain.feedback(area_m2), gain.force * outer[2]])
-    poles = gain_of(*with_integral(mode, spec.sample_time_s), K, spec.sample_time_s).poles
+    poles = gain_of(mode, K, spec.sample_time_s).poles
     return replace(gain, poles=poles)

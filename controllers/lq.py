@@ -69,24 +69,26 @@ def lq_gain(
     except (np.linalg.LinAlgError, FloatingPointError) as error:
         what = f"mode {mode.name!r}: no gains can be computed from these weights"
         raise NoGainError(what) from error
-    return gain_of(F, G, K[0], sample_time_s)
+    return gain_of(mode, K[0], sample_time_s)
 
 
 def with_integral(mode: Mode, sample_time_s: float) -> tuple[np.ndarray, np.ndarray]:
-    """F and G of a sampled mode, extended by the integral of its first state.
-
-    The integral holds the state of its own sample, as the controllers run it.
-    """
+    """F and G of a sampled mode, extended by the integral of its first state up to a sample."""
     small, n = sampled(mode, sample_time_s), len(mode.state_names)
     F, G = np.eye(n + 1), np.zeros((n + 1, 1))
-    F[:n, :n], G[:n] = small.F, small.G
-    F[n, :n], G[n] = sample_time_s * small.F[0], sample_time_s * small.G[0]
+    F[:n, :n], F[n, 0], G[:n] = small.F, sample_time_s, small.G
     return F, G
 
 
-def gain_of(F: np.ndarray, G: np.ndarray, K: np.ndarray, sample_time_s: float) -> Gain:
-    """A state feedback K of (state, integral), shape (n + 1,), with the poles that it gives."""
-    poles = np.log(np.linalg.eigvals(F - G @ K[None, :]).astype(complex)) / sample_time_s
+def gain_of(mode: Mode, K: np.ndarray, sample_time_s: float) -> Gain:
+    """A state feedback K of (state, integral), shape (n + 1,), with the poles of its loop.
+
+    The controllers integrate the error of a sample before they use the integral, which is worth
+    K_i T more of the first gain than the design has: the poles are those with it.
+    """
+    F, G = with_integral(mode, sample_time_s)
+    as_run = K + K[-1] * sample_time_s * (np.arange(len(K)) == 0)
+    poles = np.log(np.linalg.eigvals(F - G @ as_run[None, :]).astype(complex)) / sample_time_s
     return Gain(K[:-1], float(K[-1]), poles)
 
 

@@ -21,7 +21,7 @@ from enum import Enum
 import numpy as np
 
 from controllers.cascade import CascadeSpec, cascade_gain
-from controllers.lq import Gain, gain_of, lq_gain, with_integral
+from controllers.lq import Gain, gain_of, lq_gain
 from controllers.margins import Law, integral_of
 from controllers.motion import PREVIEW
 from controllers.pid import PidSpec, pid_gain
@@ -127,13 +127,13 @@ def _pid(mode: Mode, _area_m2: float, sample_time_s: float) -> Gain:
     # slower than a PID alone has it: here the integral runs from farther away
     found = pid_gain(mode, PidSpec(sample_time_s=sample_time_s, integral_time_s=1.0))
     K = np.array([found.proportional, found.derivative, 0.0, 0.0, found.integral])
-    return gain_of(*with_integral(mode, sample_time_s), K, sample_time_s)
+    return gain_of(mode, K, sample_time_s)
 
 
 def _cascade(mode: Mode, area_m2: float, sample_time_s: float) -> Gain:
     found = cascade_gain(mode, area_m2, CascadeSpec())
     K = np.array([*found.feedback(area_m2), found.force * found.outer[2]])
-    return gain_of(*with_integral(mode, sample_time_s), K, sample_time_s)
+    return gain_of(mode, K, sample_time_s)
 
 
 GAINS: Mapping[Method, Callable[[Mode, float, float], Gain]] = {
