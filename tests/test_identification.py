@@ -18,7 +18,7 @@ from workbench.errors import InputError
 from workbench.identification.dead_volume import dead_volume
 from workbench.identification.dead_zone import dead_zone
 from workbench.identification.friction import friction
-from workbench.identification.sliding import motion
+from workbench.identification.sliding import Motion, break_aways, motion
 from workbench.identification.tank_curves import tank_curves
 from workbench.identification.wall_heat import wall_heat
 from workbench.parts import Body
@@ -155,6 +155,34 @@ def test_a_map_of_steady_runs_gives_coulomb_and_viscous_friction_by_direction():
         assert found[f"viscous_{way}_n_s_m"].value == pytest.approx(laws[side][1], rel=0.03)
 
 
+def test_friction_by_pressure_stays_with_its_factor_and_is_not_counted_twice():
+    """10 N/bar across the piston, which is pushed by nothing else: F = F_c + s_2 v + c F / A."""
+    factor = 1e-4
+    share = 1.0 - factor / true.PISTON_AREA_M2
+    speeds = (0.2, 0.35, 0.5, -0.2, -0.35, -0.5)
+    runs = [sliding(v, (np.sign(v) * 28.0 + 46.0 * v) / share) for v in speeds]
+    pressed = knowing(DRIVE, friction__pressure_factor_n_pa=factor)
+    found = friction(pressed, runs)
+
+    for way in ("forward", "backward"):
+        assert found[f"coulomb_{way}_n"].value == pytest.approx(28.0, rel=0.03)
+        assert found[f"viscous_{way}_n_s_m"].value == pytest.approx(46.0, rel=0.03)
+    assert found.improved().plant.values["friction.pressure_factor_n_pa"] == factor
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_break_away_is_without_what_pressure_adds(side):
+    n = 400
+    rests = np.arange(n) < 300
+    speed = np.where(rests, 0.0, 0.1 * side)
+    moved = Motion(
+        1e-3, 1e-3 * np.cumsum(speed), speed, np.full(n, side * 40.0), np.full(n, 9.0), 2
+    )
+    (found,) = break_aways(moved)
+
+    assert (found.forward, found.force_n) == (side > 0, pytest.approx(31.0))
+
+
 def test_without_break_aways_static_friction_stays_the_rigs():
     runs = [sliding(v, np.sign(v) * 28.0 + 45.0 * v) for v in (0.2, 0.4, -0.2, -0.4)]
     found = friction(DRIVE, runs)
@@ -191,9 +219,12 @@ def test_the_mass_is_that_of_the_body_that_rubs():
         measured=("slide.position_m",),
     )
     time_s = 1e-3 * np.arange(500)
-    moved = motion(plant, rubbing, Recording("two", 1e-3, {"slide.position_m": 0.5 * time_s**2}))
+    recording = Recording("two", 1e-3, {"slide.position_m": 0.5 * time_s**2})
+    moved = motion(plant, rubbing, recording)
+    loaded = motion(plant.with_values({"slide.added_mass_kg": 1.5}), rubbing, recording)
 
     assert moved.mass_kg == 2.0
+    assert loaded.mass_kg == 3.5
     assert moved.pushing_n == pytest.approx(5.0)
 
 
