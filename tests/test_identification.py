@@ -125,6 +125,19 @@ def test_dead_volume_within_2_percent_of_the_total(release):
     assert dead == pytest.approx(study.DRIVE.dead_volume_a_m3, abs=0.02 * total)
 
 
+def test_a_rig_that_changes_its_dead_volume_gets_the_measured_total(release):
+    """The cause dead_volume multiplies the dead volume by 1 + change."""
+    rig = knowing(DRIVE, chamber_a__dead_volume_change=0.25)
+    found, plain = dead_volume(rig, [release]), dead_volume(DRIVE, [release])
+    chamber = next(p for p in found.improved().plant.parts if p.name == "chamber_a")
+
+    total = found["chamber_a.total_volume_m3"].value
+    assert float(chamber.volume_m3(true.STROKE_M)) == pytest.approx(total, rel=1e-3)
+    for kind in ("value", "deviation"):
+        own, other = (getattr(f["chamber_a.dead_volume_m3"], kind) for f in (found, plain))
+        assert 1.25 * own == pytest.approx(other)
+
+
 def test_the_printed_form_of_the_reservoir_test_would_be_20_percent_small(release):
     """E002-9: Eq. 22 with absolute pressures, V_1 (P_1 / P_2 - 1)."""
     found = dead_volume(DRIVE, [release])
