@@ -9,7 +9,7 @@ from workbench.fitting.gauss_newton import fit_windows
 from workbench.fitting.noise import measured_noise
 from workbench.fitting.unknowns import nominal_unknowns
 from workbench.fitting.windows import cut_windows
-from workbench.manoeuvres.library import position_triangle
+from workbench.manoeuvres.library import command_ramp, position_triangle
 from workbench.manoeuvres.limits import limits_of
 from workbench.manoeuvres.play import Play
 from workbench.manoeuvres.rehearse import rehearse, speed_maps
@@ -56,6 +56,21 @@ def test_a_rehearsal_begins_where_the_recording_does_and_breaks_no_limit_by_stan
         assert run[PLACE][0] == pytest.approx(0.03)
         assert [run[name][0] for name in fit.plant.state_list] == pytest.approx(list(start))
         assert limits.broken_by(run, ends=False) == ""
+
+
+def test_a_ramp_of_the_command_begins_with_a_rest_and_never_jumps(fit):
+    """Then up, through the centre, down and back, twice: at one rate."""
+    limits = limits_between(fit, 0.02, 0.08, 0.03)
+    (signal,) = limits.commands
+    (row,) = command_ramp(limits, 1.0, 0.2).commands
+    away = row - signal.nominal
+    crossings = np.flatnonzero((away[:-1] > 0) & (away[1:] <= 0))
+
+    assert away[:500] == pytest.approx(0.0, abs=1e-12)
+    assert away.max() == pytest.approx(0.2 * (signal.upper - signal.nominal), rel=0.01)
+    assert away.min() == pytest.approx(0.2 * (signal.lower - signal.nominal), rel=0.01)
+    assert np.abs(np.diff(away)).max() < 0.01 * away.max()
+    assert len(crossings) == 2
 
 
 def test_the_speed_map_goes_both_ways_where_the_recording_begins_at_a_stop(fit):
