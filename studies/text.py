@@ -42,6 +42,13 @@ def percent(share: float, digits: int = 0) -> str:
     return f"{100.0 * share:.{digits}f} %" if isfinite(share) else "-"
 
 
+def outside_band(share: float) -> str:
+    """How many lags of a correlation are outside its band, or that it is not known."""
+    if not isfinite(share):
+        return "not known: nothing was recorded of it, or nothing changes"
+    return f"{percent(share)} of the lags outside the band"
+
+
 def removed(share: float) -> str:
     """A share of a misfit that something removes: more than all of it is none."""
     return percent(told(share), 1)

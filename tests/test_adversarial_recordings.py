@@ -63,10 +63,14 @@ MISREAD = {
     "a by 10": "chamber_a.pressure looks ten times too small",
     "both pressures by 10": "chamber_a.pressure and chamber_b.pressure look ten times too small",
     "a in bar as Pa": "chamber_a.pressure looks 100 000 times (bar for Pa) too small",
+    "both pressures in psi as kPa": (
+        "chamber_a.pressure and chamber_b.pressure look 6.9 times (kPa for psi) too small"
+    ),
     "position times 10": "slide.position looks ten times (cm for mm) too large",
     "position by 10": "slide.position looks ten times (cm for mm) too small",
     "position in mm as m": "slide.position looks a thousand times (m for mm) too large",
     "position in m as mm": "slide.position looks a thousand times (m for mm) too small",
+    "position in m as cm": "slide.position looks 100 times (m for cm) too small",
     "command by 10": "valve.command looks ten times too small",
     "position negative": "slide.position seems to count the other way",
     "position mirrored": "slide.position seems to count the other way",

@@ -115,6 +115,15 @@ def test_two_flows_rest_at_0_80746_of_the_supply_where_tanh_rests_half_way(rig):
     assert [result[name][-1] for name in PRESSURES] == pytest.approx([5.2485e5] * 2, rel=1e-3)
 
 
+def test_two_flows_rest_higher_where_gas_enters_more_easily_than_it_leaves(rig):
+    """0.62 psi(r) = 0.55 r with the nozzle law: r = 0.84249 of 6.5 bar."""
+    result = held(two_flows(rig).with_values({"rod.mass_kg": 1e9}), 5.25, 5.0)
+
+    assert [result[name][-1] for name in PRESSURES] == pytest.approx(
+        [0.84249 * 6.5e5] * 2, rel=1e-3
+    )
+
+
 def test_two_flows_open_to_the_same_full_area(rig):
     full, plain = two_flows(rig), rig
     rates = [p.model.f(p.initial, [10.0], [], p.nominal[2])[0].full() for p in (full, plain)]

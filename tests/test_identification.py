@@ -18,7 +18,7 @@ from workbench.errors import InputError
 from workbench.identification.dead_volume import dead_volume
 from workbench.identification.dead_zone import dead_zone
 from workbench.identification.friction import friction
-from workbench.identification.sliding import motion
+from workbench.identification.sliding import Motion, break_aways, motion
 from workbench.identification.tank_curves import tank_curves
 from workbench.identification.wall_heat import wall_heat
 from workbench.parts import Body
@@ -125,6 +125,19 @@ def test_dead_volume_within_2_percent_of_the_total(release):
     assert dead == pytest.approx(study.DRIVE.dead_volume_a_m3, abs=0.02 * total)
 
 
+def test_a_rig_that_changes_its_dead_volume_gets_the_measured_total(release):
+    """The cause dead_volume multiplies the dead volume by 1 + change."""
+    rig = knowing(DRIVE, chamber_a__dead_volume_change=0.25)
+    found, plain = dead_volume(rig, [release]), dead_volume(DRIVE, [release])
+    chamber = next(p for p in found.improved().plant.parts if p.name == "chamber_a")
+
+    total = found["chamber_a.total_volume_m3"].value
+    assert float(chamber.volume_m3(true.STROKE_M)) == pytest.approx(total, rel=1e-3)
+    for kind in ("value", "deviation"):
+        own, other = (getattr(f["chamber_a.dead_volume_m3"], kind) for f in (found, plain))
+        assert 1.25 * own == pytest.approx(other)
+
+
 def test_the_printed_form_of_the_reservoir_test_would_be_20_percent_small(release):
     """E002-9: Eq. 22 with absolute pressures, V_1 (P_1 / P_2 - 1)."""
     found = dead_volume(DRIVE, [release])
@@ -153,6 +166,34 @@ def test_a_map_of_steady_runs_gives_coulomb_and_viscous_friction_by_direction():
     for side, way in ((1.0, "forward"), (-1.0, "backward")):
         assert found[f"coulomb_{way}_n"].value == pytest.approx(laws[side][0], rel=0.03)
         assert found[f"viscous_{way}_n_s_m"].value == pytest.approx(laws[side][1], rel=0.03)
+
+
+def test_friction_by_pressure_stays_with_its_factor_and_is_not_counted_twice():
+    """10 N/bar across the piston, which is pushed by nothing else: F = F_c + s_2 v + c F / A."""
+    factor = 1e-4
+    share = 1.0 - factor / true.PISTON_AREA_M2
+    speeds = (0.2, 0.35, 0.5, -0.2, -0.35, -0.5)
+    runs = [sliding(v, (np.sign(v) * 28.0 + 46.0 * v) / share) for v in speeds]
+    pressed = knowing(DRIVE, friction__pressure_factor_n_pa=factor)
+    found = friction(pressed, runs)
+
+    for way in ("forward", "backward"):
+        assert found[f"coulomb_{way}_n"].value == pytest.approx(28.0, rel=0.03)
+        assert found[f"viscous_{way}_n_s_m"].value == pytest.approx(46.0, rel=0.03)
+    assert found.improved().plant.values["friction.pressure_factor_n_pa"] == factor
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_break_away_is_without_what_pressure_adds(side):
+    n = 400
+    rests = np.arange(n) < 300
+    speed = np.where(rests, 0.0, 0.1 * side)
+    moved = Motion(
+        1e-3, 1e-3 * np.cumsum(speed), speed, np.full(n, side * 40.0), np.full(n, 9.0), 2
+    )
+    (found,) = break_aways(moved)
+
+    assert (found.forward, found.force_n) == (side > 0, pytest.approx(31.0))
 
 
 def test_without_break_aways_static_friction_stays_the_rigs():
@@ -191,9 +232,12 @@ def test_the_mass_is_that_of_the_body_that_rubs():
         measured=("slide.position_m",),
     )
     time_s = 1e-3 * np.arange(500)
-    moved = motion(plant, rubbing, Recording("two", 1e-3, {"slide.position_m": 0.5 * time_s**2}))
+    recording = Recording("two", 1e-3, {"slide.position_m": 0.5 * time_s**2})
+    moved = motion(plant, rubbing, recording)
+    loaded = motion(plant.with_values({"slide.added_mass_kg": 1.5}), rubbing, recording)
 
     assert moved.mass_kg == 2.0
+    assert loaded.mass_kg == 3.5
     assert moved.pushing_n == pytest.approx(5.0)
 
 

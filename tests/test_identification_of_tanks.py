@@ -16,10 +16,10 @@ from studies.truth import dedicated as truth
 from studies.truth import drive as true
 from workbench.comparison import compare
 from workbench.errors import InputError
-from workbench.identification import PROCEDURES
+from workbench.identification import PROCEDURES, least_squares
 from workbench.identification.dead_zone import dead_zone
 from workbench.identification.standing import end_reached
-from workbench.identification.tank_curves import tank_curves
+from workbench.identification.tank_curves import LEAN, tank_curves
 from workbench.rig import default_rig, load_rig
 from workbench.rig_writing import rig_text
 
@@ -141,18 +141,40 @@ def test_flow_parameters_of_each_path_come_out(flow):
         assert curve.subsonic_index.value == pytest.approx(0.52, abs=0.03)
 
 
-def test_the_curve_of_the_closed_valve_alone_ends_at_bounds_and_says_which(flow):
-    known = flow.rig.plant.parameters
-    for curve in flow.curves:
-        side = "supply" if curve.charging else "exhaust"
-        names = (f"{side}_critical_ratio", "cracking_ratio", "subsonic_index")
-        values = {name: getattr(curve, name.removeprefix(f"{side}_")) for name in names}
-        ends = [
-            each.name
-            for name, each in values.items()
-            if isfinite(end_reached(known[f"valve.{name}"], each.value))
-        ]
+def shape_at_ends(known, curve):
+    """Which values of a curve's own shape stand at an end of their range."""
+    side = "supply" if curve.charging else "exhaust"
+    names = (f"{side}_critical_ratio", "cracking_ratio", "subsonic_index")
+    values = {name: getattr(curve, name.removeprefix(f"{side}_")) for name in names}
+    return [
+        each.name
+        for name, each in values.items()
+        if isfinite(end_reached(known[f"valve.{name}"], each.value))
+    ]
 
+
+def test_the_curve_of_the_closed_valve_keeps_the_shape_of_the_rig_as_it_says_nothing_of_it(flow):
+    """Its errors are as slow as the leak: weighed as noise they drove b and m to their bounds."""
+    own = flow.rig.plant.values
+    (closed,) = [each for each in flow.curves if round(each.command_v, 2) == 5.0]
+    names = {"b": "supply_critical_ratio", "a": "cracking_ratio", "m": "subsonic_index"}
+
+    for letter, name in names.items():
+        found, lean = closed.shape[letter], LEAN[letter]
+        assert found.value == pytest.approx(own[f"valve.{name}"], abs=0.01 * lean), name
+        assert found.deviation == pytest.approx(lean, rel=0.01), name
+    for curve in flow.curves:
+        assert not shape_at_ends(flow.rig.plant.parameters, curve), curve.label
+        assert curve.at_bound == (), curve.label
+
+
+def test_a_curve_whose_shape_ends_at_bounds_says_which(limits, curves, monkeypatch):
+    """Weighed against the noise alone, nothing holds the shape of the closed valve's curve."""
+    monkeypatch.setattr(least_squares, "WEIGHINGS", 1)
+    found = tank_curves(limits.improved(), curves)
+
+    for curve in found.curves:
+        ends = shape_at_ends(found.rig.plant.parameters, curve)
         assert list(curve.at_bound) == ends, curve.label
         assert bool(ends) is (round(curve.command_v, 2) == 5.0), curve.label
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from page_files import drive_files
 
+from studies.text import outside_band
 from workbench.comparison.independence import independence
 from workbench.fitting.identifiability import identifiability
 from workbench.reading import read_recording
@@ -36,10 +37,44 @@ def test_the_correlation_is_that_of_numpy():
     assert found.correlation == pytest.approx(whole[299 - 20 : 299 + 21])
 
 
-def test_an_error_without_samples_has_no_correlation():
-    found = independence(np.full(9, np.nan), np.arange(9.0), "u", 1.0, 3)
+@pytest.mark.parametrize(
+    ("error", "values"),
+    [
+        (np.full(9, np.nan), np.arange(9.0)),
+        (np.sin(np.arange(400.0)), np.full(400, 4.95)),
+        (np.full(400, 0.1), np.arange(400.0)),
+    ],
+    ids=["no samples", "constant input", "constant error"],
+)
+def test_without_anything_to_correlate_independence_is_not_known(error, values):
+    """None of the lags outside the band would read as an error that is independent."""
+    found = independence(error, values, "u", 1.0, 3)
 
-    assert found.correlation.tolist() == [0.0]
+    assert not len(found.correlation) and not len(found.lag_s)
+    assert np.isnan(found.outside)
+    assert outside_band(found.outside).startswith("not known")
+
+
+def test_missing_samples_take_nothing_off_the_correlation_with_an_input():
+    rng = np.random.default_rng(6)
+    e, u = rng.standard_normal((2, 8000))
+    late = e + np.concatenate([np.zeros(3), u[:-3]])
+    whole = independence(late, u, "u", 1e-3, 20)
+    late[::4] = np.nan
+    found = independence(late, u, "u", 1e-3, 20)
+
+    assert whole.correlation[23] == pytest.approx(np.sqrt(0.5), abs=0.03)
+    assert found.correlation[23] == pytest.approx(np.sqrt(0.5), abs=0.03)
+    assert found.bands[23] == pytest.approx(1.96 / np.sqrt(4000), rel=0.15)
+
+
+def test_lags_that_no_pair_has_are_left_out():
+    error = np.sin(np.arange(400.0))
+    error[::2] = np.nan
+
+    found = independence(error, np.cos(np.arange(400.0)), "u", 1.0, 4)
+
+    assert found.lag_s.tolist() == [-4.0, -2.0, 0.0, 2.0, 4.0]
 
 
 def test_a_drive_that_moves_tells_its_mass_and_none_of_the_ambient_pressure(tmp_path):

@@ -63,6 +63,20 @@ def test_holes_and_gaps_part_a_residual():
     assert (np.diff(found.correlation) < 0).all() and found.correlation[1] > 0.98
 
 
+def test_missing_samples_take_nothing_off_a_correlation():
+    """e[k] = 0.9 e[k-1] + w, every fourth sample missing: half the neighbours are left."""
+    error = np.zeros(20_000)
+    for k, drive in enumerate(white(20_000)[1:], start=1):
+        error[k] = 0.9 * error[k - 1] + drive
+    whole = residual_of(recording_of(error), error, 1.0)
+    error[::4] = np.nan
+    found = residual_of(recording_of(error), error, 1.0)
+
+    assert found.correlation[:3] == pytest.approx([1.0, 0.9, 0.81], abs=0.03)
+    assert found.correlation[:3] == pytest.approx(whole.correlation[:3], abs=0.02)
+    assert found.bands[:3] == pytest.approx(1.96 / np.sqrt([15_000, 10_000, 5_000]), rel=1e-3)
+
+
 def test_an_error_that_is_nowhere_known_has_no_spectrum():
     error = np.full(300, np.nan)
 

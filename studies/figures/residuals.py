@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from studies.figures.style import BLUE, GREY, PAGE_IN, RED, new_figure, styled
-from studies.text import percent
+from studies.text import outside_band
 from workbench.comparison.compare import ONE_STEP, PLAIN
 from workbench.units import display_scale, display_unit, public_name
 
@@ -53,14 +53,14 @@ def _draw_spectrum(axes: Axes, name: str, residual: Residual) -> None:
 
 
 def _draw_correlation(axes: Axes, name: str, residual: Residual) -> None:
-    lags, values = residual.lag_s[1:], residual.correlation[1:]
-    axes.axhspan(-residual.band, residual.band, color=GREY, alpha=0.5, linewidth=0, label="band")
+    lags, values, bands = (a[1:] for a in (residual.lag_s, residual.correlation, residual.bands))
+    axes.fill_between(lags, -bands, bands, color=GREY, alpha=0.5, linewidth=0, label="band")
     axes.plot(lags, values, "o-", color=BLUE, markersize=1.5, linewidth=0.5, label="correlation")
-    most = 1.15 * max(np.max(np.abs(values), initial=0.0), 2.0 * residual.band)
-    axes.set_ylim(-most, most)
+    most = 1.15 * max(np.max(np.abs(values), initial=0.0), np.max(2.0 * bands, initial=0.0))
+    axes.set_ylim(-(most or 1.0), most or 1.0)
     axes.set_ylabel("correlation (-)")
     axes.annotate(
-        f"{percent(residual.outside)} of the lags outside",
+        outside_band(residual.outside),
         (0.98, 0.96),
         xycoords="axes fraction",
         ha="right",

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from html import escape
+from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 from studies.figures.style import BLUE
 from studies.page.look import SOFT, chart, column, put, row, sharing, text
-from studies.text import percent
+from studies.text import outside_band
 from workbench.units import public_name
 
 if TYPE_CHECKING:
@@ -24,17 +25,15 @@ class ResidualTests:
 
     def build(self) -> Model:
         """Two charts."""
-        from bokeh.models import BoxAnnotation, ColumnDataSource
+        from bokeh.models import ColumnDataSource
 
-        self._sources, self._bands, self._charts = [], [], []
+        self._sources, self._charts = [], []
         for y in ("autocorrelation (-)", "with the input (-)"):
-            source = ColumnDataSource(data={"lag": [], "value": []})
+            source = ColumnDataSource(data={"lag": [], "value": [], "low": [], "high": []})
             found = chart("lag (ms)", y, HEIGHT)
-            band = BoxAnnotation(bottom=0, top=0, fill_color=SOFT, fill_alpha=0.18)
-            found.add_layout(band)
+            found.varea("lag", "low", "high", source=source, fill_color=SOFT, fill_alpha=0.18)
             found.segment("lag", 0, "lag", "value", source=source, color=BLUE, line_width=1.5)
             self._sources.append(source)
-            self._bands.append(band)
             self._charts.append(found)
         self._titles = [text(), text()]
         pairs = [
@@ -56,19 +55,20 @@ class ResidualTests:
         """Both tests of one output."""
         self._whole.visible = True
         output = public_name(name)
-        self._put(0, residual.lag_s[1:], residual.correlation[1:], residual.band,
+        self._put(0, residual.lag_s[1:], residual.correlation[1:], residual.bands[1:],
                   _said(f"Whiteness of {output}, one step ahead", residual.outside))  # fmt: skip
         self._pairs[1].visible = against is not None
         if against is not None:
             what = f"Independence of {output} from {public_name(against.against)}"
             told = _said(what, against.outside)
-            self._put(1, against.lag_s, against.correlation, against.band, told)
+            self._put(1, against.lag_s, against.correlation, against.bands, told)
 
-    def _put(self, k: int, lag_s: Any, values: Any, band: float, title: str) -> None:
-        self._sources[k].data = {"lag": 1e3 * lag_s, "value": values}
-        self._bands[k].update(bottom=-band, top=band)
+    def _put(self, k: int, lag_s: Any, values: Any, bands: Any, title: str) -> None:
+        rows = {"lag": 1e3 * lag_s, "value": values, "low": -bands, "high": bands}
+        self._sources[k].data = rows
         put(self._titles[k], f"<p>{escape(title)}</p>")
 
 
 def _said(what: str, outside: float) -> str:
-    return f"{what}: {percent(outside)} of the lags outside the band (5 % is chance)"
+    chance = " (5 % is chance)" if isfinite(outside) else ""
+    return f"{what}: {outside_band(outside)}{chance}"

@@ -106,9 +106,9 @@ def _start(moved: Motion) -> BreakAway | None:
     first = int(np.argmax(np.abs(away) > MOVED_M))
     if not first:
         return None
-    force = np.convolve(moved.pushing_n, np.full(AVERAGED, 1 / AVERAGED), mode="same")
     forward = bool(away[first] > 0)
-    size = np.max(force[rest:first] if forward else -force[rest:first])
+    force = np.convolve(moved.friction_n(forward), np.full(AVERAGED, 1 / AVERAGED), mode="same")
+    size = np.max(force[rest:first])
     return BreakAway(float(moved.position_m[0]), forward, float(size))
 
 

@@ -3,6 +3,8 @@
 Where model and noise are right, the error e knows nothing of the input u.  Then their correlation
 at lag k, r(k) = sum e(t + k) u(t) / (n s_e s_u), stays within +-1.96 sqrt(P / n) for 95 % of all
 lags, with P = sum over k of R_e(k) R_u(k), both as correlations.  Lags below zero show feedback.
+Where samples are missing each sum has fewer terms than it would have: r(k) is scaled up by that,
+the band by its root.
 
 Source: Ljung, System Identification, 2nd ed., 16.6, Eq. 16.64 to 16.66.
 """
@@ -16,25 +18,33 @@ import numpy as np
 
 from workbench.comparison.compare import RecordingComparison
 from workbench.comparison.horizons import ONE_STEP, PLAIN
-from workbench.comparison.residuals import NORMAL_95, autocorrelation
+from workbench.comparison.residuals import NORMAL_95
 from workbench.recording import Recording
 from workbench.rig import Rig
 
 
 @dataclass(frozen=True)
 class Independence:
-    """Correlation of an output's error with an input: lags (n,) from negative on, and its band."""
+    """Correlation of an output's error with an input: lags (n,) from negative on, and its bands.
+
+    All are empty where it is not known: without samples, or where error or input never change.
+    """
 
     against: str
     lag_s: np.ndarray
     correlation: np.ndarray
-    band: float
+    bands: np.ndarray
+
+    @property
+    def band(self) -> float:
+        """Half width of the band where no pair is missing; NaN where nothing is known."""
+        return float(np.min(self.bands)) if len(self.bands) else float("nan")
 
     @property
     def outside(self) -> float:
         """Share of the lags from 0 on outside the band; 0.05 is chance.  NaN without any."""
-        causal = np.abs(self.correlation[self.lag_s >= 0.0])
-        return float(np.mean(causal > self.band)) if len(causal) else float("nan")
+        causal = (np.abs(self.correlation) > self.bands)[self.lag_s >= 0.0]
+        return float(np.mean(causal)) if len(causal) else float("nan")
 
 
 def independence_of(
@@ -67,17 +77,25 @@ def independence(
     """Correlation of an error (n,), NaN where there is none, with an input (n,) at +-lags."""
     seen = np.isfinite(error) & np.isfinite(values)
     count = int(seen.sum())
+    if not count or np.ptp(error[seen]) == 0.0 or np.ptp(values[seen]) == 0.0:
+        return Independence(against, *np.zeros((3, 0)))
     lags = max(min(lags, count - 1), 0)
-    steps = np.arange(-lags, lags + 1)
-    if not count:
-        return Independence(against, sample_time_s * steps, np.zeros(1), 0.0)
     e, u = (np.where(seen, each - each[seen].mean(), 0.0) for each in (error, values))
-    size = float(np.sqrt((e @ e) * (u @ u)))
-    if size == 0.0:
-        return Independence(against, sample_time_s * steps, np.zeros(len(steps)), 0.0)
-    n = len(e)
-    sums = [float(e[max(k, 0) : n + min(k, 0)] @ u[max(-k, 0) : n - max(k, 0)]) for k in steps]
-    own, other = (autocorrelation([each], lags)[0] for each in (e, u))
-    spread = float(own[0] * other[0] + 2.0 * (own[1:] @ other[1:]))
-    band = NORMAL_95 * np.sqrt(max(spread, 1.0) / count)
-    return Independence(against, sample_time_s * steps, np.array(sums) / size, band)
+    steps = np.arange(-lags, lags + 1)
+    pairs = _sums(1.0 * seen, 1.0 * seen, steps)
+    steps, pairs = steps[pairs > 0], pairs[pairs > 0]
+    kept = pairs / (count * (1.0 - np.abs(steps) / len(e)))  # of the pairs without a hole
+
+    def correlation(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+        return _sums(one, other, steps) / kept / np.sqrt((one @ one) * (other @ other))
+
+    spread = float(np.sum(kept * correlation(e, e) * correlation(u, u)))
+    bands = NORMAL_95 * np.sqrt(max(spread, 1.0) / count / kept)
+    return Independence(against, sample_time_s * steps, correlation(e, u), bands)
+
+
+def _sums(one: np.ndarray, other: np.ndarray, steps: np.ndarray) -> np.ndarray:
+    """Sums of one(t + k) other(t) at so many samples, shape of ``steps``."""
+    n = len(one)
+    pairs = ((one[max(k, 0) : n + min(k, 0)], other[max(-k, 0) : n - max(k, 0)]) for k in steps)
+    return np.array([float(a @ b) for a, b in pairs])

@@ -1,8 +1,9 @@
 """What is left of a signal: its spectrum, and whether it is white.
 
 The innovations of a one-step filter are white where plant and noise are right.  Then their
-autocorrelation stays within +-1.96/sqrt(n) in 95 % of all lags and their spectrum is flat, at
-2 sigma^2 dt for one side.
+autocorrelation stays within +-1.96/sqrt(n) in 95 % of all lags, n the pairs of samples so far
+apart, and their spectrum is flat, at 2 sigma^2 dt for one side.  Holes cost pairs, at long lags
+more than at short ones, so that each lag is a mean over its own.
 
 Source: Ljung, System Identification, 2nd ed., 16.6 (residual analysis); Welch 1967 (spectrum).
 """
@@ -33,8 +34,8 @@ class Residual:
         One-sided spectral density in the square of the output's SI unit per hertz, (n_f,).
     lag_s, correlation
         Autocorrelation from lag 0 on, (n_lags,).
-    band
-        Half width that 95 % of the lags of white noise keep.
+    bands
+        Half width at each lag that 95 % of those of white noise keep, (n_lags,).
     floor
         Density of the noise alone.
     """
@@ -43,14 +44,19 @@ class Residual:
     density: np.ndarray
     lag_s: np.ndarray
     correlation: np.ndarray
-    band: float
+    bands: np.ndarray
     floor: float
+
+    @property
+    def band(self) -> float:
+        """Half width of the band for as many pairs as samples; NaN where nothing is known."""
+        return float(self.bands[0]) if len(self.bands) else float("nan")
 
     @property
     def outside(self) -> float:
         """Share of the lags outside the band; 0.05 is chance.  NaN where nothing is known."""
-        lags = self.correlation[1:]
-        return float(np.mean(np.abs(lags) > self.band)) if len(lags) else float("nan")
+        beyond = np.abs(self.correlation[1:]) > self.bands[1:]
+        return float(np.mean(beyond)) if len(beyond) else float("nan")
 
 
 def residual_of(recording: Recording, error: np.ndarray, noise: float) -> Residual:
@@ -58,13 +64,13 @@ def residual_of(recording: Recording, error: np.ndarray, noise: float) -> Residu
     dt = recording.sample_time_s
     stretches = [*_stretches(recording, error)]
     frequency_hz, density = spectrum(stretches, dt)
-    correlation, count = autocorrelation(stretches, _lags(dt, stretches))
+    correlation, pairs = autocorrelation(stretches, _lags(dt, stretches))
     return Residual(
         frequency_hz=frequency_hz,
         density=density,
         lag_s=dt * np.arange(len(correlation)),
         correlation=correlation,
-        band=NORMAL_95 / np.sqrt(max(count, 1)),
+        bands=NORMAL_95 / np.sqrt(pairs),
         floor=2.0 * noise**2 * dt,
     )
 
@@ -86,19 +92,21 @@ def spectrum(stretches: list[np.ndarray], sample_time_s: float) -> tuple[np.ndar
     return found[0][0], np.average([density for _, density in found], axis=0, weights=weights)
 
 
-def autocorrelation(stretches: list[np.ndarray], lags: int) -> tuple[np.ndarray, int]:
-    """Correlation of values so many samples apart, (lags + 1,), and how many values there are.
+def autocorrelation(stretches: list[np.ndarray], lags: int) -> tuple[np.ndarray, np.ndarray]:
+    """Correlation of values so many samples apart, and how many pairs there are, (lags + 1,) each.
 
-    Only pairs within one stretch count; empty where nothing varies.
+    Only pairs within one stretch count, and each lag is a mean over its own; both are empty where
+    nothing varies.  No lag may be longer than every stretch.
     """
-    count = sum(map(len, stretches))
-    mean = sum(float(each.sum()) for each in stretches) / max(count, 1)
-    free = [each - mean for each in stretches]
-    sums = np.zeros(lags + 1)
-    for each in free:
+    mean = sum(float(each.sum()) for each in stretches) / max(sum(map(len, stretches)), 1)
+    sums, pairs = np.zeros((2, lags + 1))
+    for each in (stretch - mean for stretch in stretches):
         most = min(lags + 1, len(each))
         sums[:most] += [float(each[: len(each) - k] @ each[k:]) for k in range(most)]
-    return (sums / sums[0] if sums[0] > 0 else np.zeros(0)), count
+        pairs[:most] += len(each) - np.arange(most)
+    if sums[0] <= 0.0:
+        return np.zeros(0), np.zeros(0)
+    return sums / pairs * (pairs[0] / sums[0]), pairs
 
 
 def _lags(sample_time_s: float, stretches: list[np.ndarray]) -> int:

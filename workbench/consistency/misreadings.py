@@ -28,8 +28,14 @@ FACTORS = {
         1e3: f"{THOUSAND} (kPa for Pa)",
         1e5: "100 000 times (bar for Pa)",
         14.504: "14.5 times (bar for psi)",
+        6.895: "6.9 times (kPa for psi)",
     },
-    "m": {10.0: f"{TEN} (cm for mm)", 1e3: f"{THOUSAND} (m for mm)", 25.4: "25.4 times (inches)"},
+    "m": {
+        10.0: f"{TEN} (cm for mm)",
+        100.0: "100 times (m for cm)",
+        1e3: f"{THOUSAND} (m for mm)",
+        25.4: "25.4 times (inches)",
+    },
     "m_s": {10.0: TEN, 1e3: f"{THOUSAND} (m/s for mm/s)"},
     "rad": {10.0: TEN, 57.296: "57.3 times (rad for deg)"},
     "n": {10.0: TEN, 1e3: f"{THOUSAND} (kN for N)"},
@@ -56,16 +62,20 @@ class Misreading:
 
 
 def misreadings(plant: Plant, recording: Recording) -> list[Misreading]:
-    """All that the plant's channels allow and that give numbers that can be."""
+    """All that the plant's channels allow and that give numbers that can be.
+
+    Of two that explain a recording equally well the first is named: one that keeps a switched
+    command at its levels comes before one that makes it ten times smaller.
+    """
     inputs = tuple(signal.name for signal in (*plant.commands, *plant.measured_inputs))
     names = (*inputs, *plant.measured)
     rows = {name: recording[name] for name in names}
     groups = _groups(plant, rows)
     found = [
         *_exchanged(rows),
+        *_turned(plant, rows),
         *_scaled(groups, rows),
         *_offset(groups, rows),
-        *_turned(plant, rows),
     ]
     limits = {s.name: (s.lower, s.upper) for s in plant.commands}
     return [each for each in found if all(_can_be(*row, limits) for row in each.righted.items())]
@@ -120,12 +130,12 @@ def _turned(plant: Plant, rows: Rows) -> Iterator[Misreading]:
                 for row in _mirrored(plant, name, rows[name])
             )
     for signal in plant.commands:
-        middle = 2.0 * signal.nominal
+        both = min(signal.levels) + max(signal.levels) if signal.levels else 2.0 * signal.nominal
         yield Misreading(
             (signal.name,),
             "seems to act the other way",
-            f"{middle:g} minus the recorded command, or the hoses exchanged",
-            {signal.name: middle - rows[signal.name]},
+            f"{both:g} minus the recorded command, or the hoses exchanged",
+            {signal.name: both - rows[signal.name]},
         )
 
 

@@ -96,8 +96,11 @@ def _thought_over(
 
 
 def _removed(done: Rounds, passes: Passes, step: Addition) -> Rounds:
-    """Backward pass over one effect; one alone was judged in its round."""
-    if done.kept is None or len(done.kept.steps) < 2:
+    """Backward pass over one effect; one that came in alone was judged in its round.
+
+    One that is left alone was not: it came in on top of another.
+    """
+    if done.kept is None or (len(done.kept.steps) < 2 and done.kept.judged(step)):
         return done
     removal, kept = passes.removal(done.kept, step)
     done = replace(done, removals=(*done.removals, removal), kept=kept)

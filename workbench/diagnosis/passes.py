@@ -139,8 +139,13 @@ class Passes:
         return removal, Kept(rest, base, at.problem.base_validation) if against else kept
 
     def swaps(self, kept: Kept, step: Addition) -> tuple[list[Swap], Kept]:
-        """Try the rivals of one effect in its place; the first that is clearly better takes it."""
+        """Try the rivals of one effect in its place; the first that is clearly better takes it.
+
+        None is tried in the place of what another kept effect needs.
+        """
         tried: list[Swap] = []
+        if self._needing(kept.without(step)):
+            return tried, kept
         for row in self._rivals(kept, step):
             if kept.judged(step):
                 own = (step.drop_train, step.drop_validation)

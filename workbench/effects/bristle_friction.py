@@ -119,7 +119,7 @@ class BristleFriction(StribeckFriction):
         return {"deflection_m": self._rate(now)}
 
     def _static_force_n(self, now: Conditions) -> Expression:
-        return self.coulomb_force_n + self.stiction_excess_n + self._pressed_n(now)
+        return self.coulomb_force_n + self.stiction_excess_n + self.pressed_force_n(now)
 
     def _rate(self, now: Conditions) -> Expression:
         velocity_m_s, z = self.sliding_velocity_m_s(now), now[self.name].deflection_m

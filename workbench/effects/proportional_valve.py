@@ -80,8 +80,9 @@ class TwoFlows:
 
     A_s = g_c (du + w)+,   A_e = g_d (w - du)+,   g (span + w) = c_d pi R^2: full at du = span
 
-    At the centre the chamber rests at 0.80746 of the supply pressure.  The shape of the hole and
-    its clearance do not enter.
+    At the centre the chamber rests where g_c psi(P / P_S) = g_d P / P_S: at 0.80746 of the supply
+    pressure where charging and discharging coefficient are equal, at 0.8425 with the 0.62 and 0.55
+    of paper 000's rig.  The shape of the hole and its clearance do not enter.
 
     Source: paper 000, method 3, which it rejects; scaled to the same full opening (chosen).
     """

@@ -140,7 +140,7 @@ class StribeckFriction(Effect):
         peak = ca.exp(-ca.fmin(relative**self.stribeck_exponent, 50.0))
         excess_n = self.stiction_excess_n * (1.0 + self.excess_weight * side) * peak
         plain_n = self.coulomb_force_n * (1.0 + self.coulomb_weight * side) + excess_n
-        return self._along(now) * plain_n + self._pressed_n(now)
+        return self._along(now) * plain_n + self.pressed_force_n(now)
 
     def steady_force_n(self, now: Conditions) -> Expression:
         """What any of these laws comes to in steady sliding: F = sign(v) g + s2 (v + e |v|).
@@ -160,8 +160,8 @@ class StribeckFriction(Effect):
         angle = 2.0 * ca.pi * now[self.body].position_m / self.wavelength_m + self.phase_rad
         return 1.0 + self.position_share * ca.cos(angle)
 
-    def _pressed_n(self, now: Conditions) -> Expression:
-        """Dry friction by the pressure that presses the seals on."""
+    def pressed_force_n(self, now: Conditions) -> Expression:
+        """Part of the dry friction by the pressure that presses the seals on, positive."""
         if not self.chambers:
             return 0.0
         first, second = (*self.chambers, "atmosphere")[:2]

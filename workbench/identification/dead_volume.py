@@ -10,7 +10,8 @@ empty chamber only; with absolute pressures and a chamber at ambient it is 20 % 
 
 P_2 is read in the flat window, at least 20 s behind the release, and carried back to the
 release along its own slope there: what is lost by then has leaked, not cooled.  The dead volume is
-V_i without what the piston has swept, by the plant's own geometry.
+V_i without what the piston has swept, by the plant's own geometry; where the plant changes its dead
+volume by a share, it keeps that share and what is found is the volume that is changed.
 
 Source: paper 002 Eqs. 22, 23, Fig. 15, Table 6 (E002-8, E002-9); physics.md 5, row S002-7.
 """
@@ -169,10 +170,11 @@ def _volumes(
     slopes = np.array([1 / fallen, -1 / fallen - 1 / risen, 1 / risen])
     deviation = total * GAUGE_ERROR * SPAN_PA * float(np.linalg.norm(slopes)) / np.sqrt(12.0)
     dead = f"{chamber.name}.dead_volume_m3"
-    swept = geometry(plant, chamber, recording)[0] - plant.values[dead]
+    changed = 1.0 + plant.values.get(f"{chamber.name}.dead_volume_change", 0.0)
+    swept = geometry(plant, chamber, recording)[0] - changed * plant.values[dead]
     return (
         Estimate(f"{chamber.name}.total_volume_m3", total, deviation),
-        Estimate(dead, total - swept, deviation),
+        Estimate(dead, (total - swept) / changed, deviation / changed),
     )
 
 

@@ -6,6 +6,8 @@ by direction.  Runs at constant command give F_c and sigma_2, break-aways F_s; v
 where a run is slow enough to show it (three v_s), and else stays the rig's.  F_s depends on
 where the piston rests, and its deviation counts the spread over the break-aways.
 
+Where the rig has friction by pressure, it keeps its factor, and the map is without that part.
+
 The bristle follows by rule (S002-6): F_c / 50 um <= sigma_0 <= F_c / 1 um, and
 sigma_1 <= sigma_2 / (F_s / F_c - 1).  The rig keeps its own deflection inside these
 bounds; beyond them it gets sigma_0 = F_c / 25.3 um, the paper's choice, and the largest sigma_1.
@@ -144,7 +146,10 @@ def _check_directions(
 
 
 def _law(effect: StribeckFriction, runs: list[SteadyRun], breaks: list[BreakAway]) -> _Law:
-    """The law with symbols for what is free; forces that vary along the stroke average out."""
+    """The law with symbols for what is free; forces that vary along the stroke average out.
+
+    What pressure adds is not in the runs' friction, and so not in the law either.
+    """
     slow = min(abs(run.velocity_m_s) for run in runs) < SLOW * effect.stribeck_velocity_m_s
     free = (*FREE, *(STATIC if breaks else ()), *((FALL,) if breaks and slow else ()))
     theta = {name: ca.SX.sym(name) for name in free}

@@ -1,21 +1,23 @@
 """What a drive's recordings show of friction: forces at steady speed, and forces at break-away.
 
 The force of friction is what all others leave over, read from the plant's own balance of the body
-at the recorded pressures: F_f = sum of the other forces - M a.
+at the recorded pressures: F_f = sum of the other forces - M a.  What the plant's own factor says
+that pressure adds to it is taken off: the factor stays in the plant, and would count twice.
 
 Source: paper 002 Eq. 9, Figs. 13 and 14; physics.md 5, rows S002-4 and S002-5.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
 
 from workbench.differentiator import derivative
+from workbench.effect import Expression
 from workbench.effects import StribeckFriction
-from workbench.parts import Body
 from workbench.plant import Plant
 from workbench.recording import Recording
 
@@ -30,7 +32,10 @@ FORCE_SAMPLES = 5  # over which forces are averaged
 
 @dataclass(frozen=True)
 class SteadyRun:
-    """Mean speed and friction of one run, and the standard deviation of that friction."""
+    """Mean speed and friction of one run, and the standard deviation of that friction.
+
+    As in all of this file, friction is without the part by pressure.
+    """
 
     velocity_m_s: float
     force_n: float
@@ -48,13 +53,22 @@ class BreakAway:
 
 @dataclass(frozen=True)
 class Motion:
-    """Position, speed and the sum of all forces but friction, each of shape (n,)."""
+    """Position, speed and the sum of all forces but friction, each of shape (n,).
+
+    ``pressed_n`` is the dry friction by pressure, positive; ``mass_kg`` all that moves along.
+    """
 
     sample_time_s: float
     position_m: np.ndarray
     velocity_m_s: np.ndarray
     pushing_n: np.ndarray
+    pressed_n: np.ndarray
     mass_kg: float
+
+    def friction_n(self, forward: bool, mean_samples: int = 1) -> np.ndarray:
+        """What friction holds against at rest or at constant speed, (n,), positive that way."""
+        pushing_n = self.pushing_n if forward else -self.pushing_n
+        return averaged(pushing_n - self.pressed_n, mean_samples)
 
 
 def motion(plant: Plant, friction: StribeckFriction, recording: Recording) -> Motion:
@@ -72,21 +86,27 @@ def motion(plant: Plant, friction: StribeckFriction, recording: Recording) -> Mo
         for group in (plant.commands, plant.measured_inputs)
     )
     model = plant.model
-    others = [
-        value
-        for (member, kind, balance), value in model.flows.items()
-        if kind == "Force" and balance == body and member != friction.name
-    ]
-    pushing = ca.Function("pushing", [*model.symbols], [sum(others)]).map(len(recording))
-    mass = next(p.mass_kg for p in plant.parts if isinstance(p, Body) and p.name == body)
-    force = pushing(x, u, d, plant.nominal[2]).full().ravel()
-    return Motion(dt, position, seen[f"{body}.velocity_m_s"], force, float(mass))
+    pushed = sum(_received(plant, "Force", body, but=friction.name))
+    carried = sum(_received(plant, "AddedMass", body))
+    moved_kg = model.conditions.read(f"{body}.moving_mass_kg") + carried
+    told = ca.vertcat(pushed, friction.pressed_force_n(model.conditions), moved_kg)
+    evaluate = ca.Function("told", [*model.symbols], [told]).map(len(recording))
+    pushing, pressed, mass = evaluate(x, u, d, plant.nominal[2]).full()
+    speed = seen[f"{body}.velocity_m_s"]
+    return Motion(dt, position, speed, pushing, pressed, float(np.mean(mass)))
+
+
+def _received(plant: Plant, kind: str, body: str, but: str = "") -> Iterator[Expression]:
+    """What all members but one put into a body."""
+    for (member, flow, balance), value in plant.model.flows.items():
+        if flow == kind and balance == body and member != but:
+            yield value
 
 
 def steady_run(moved: Motion) -> SteadyRun | None:
     """The longest stretch of steady speed, if it is long enough."""
     width = max(round(SMOOTHING_S / moved.sample_time_s), 1)
-    speed = _averaged(moved.velocity_m_s, width)
+    speed = averaged(moved.velocity_m_s, width)
     fast = np.abs(speed) > 0.5 * np.quantile(np.abs(speed), 0.95)
     usual = float(np.median(speed[fast])) if fast.any() else 0.0
     first, last = _longest(np.abs(speed - usual) < STEADY * abs(usual))
@@ -96,7 +116,8 @@ def steady_run(moved: Motion) -> SteadyRun | None:
         return None
     time_s = moved.sample_time_s * np.arange(len(position))
     acceleration = float(np.polyfit(time_s, speed[inside], 1)[0])
-    force = moved.pushing_n[inside] - moved.mass_kg * acceleration
+    along = 1.0 if usual > 0 else -1.0
+    force = along * moved.friction_n(usual > 0)[inside] - moved.mass_kg * acceleration
     blocks = force[: len(force) // width * width].reshape(-1, width).mean(axis=1)
     deviation = float(np.std(blocks) / np.sqrt(len(blocks)))
     velocity = float((position[-1] - position[0]) / time_s[-1])
@@ -109,9 +130,8 @@ def break_aways(moved: Motion) -> tuple[BreakAway, ...]:
     The piston creeps for a while at that force, since friction falls with speed only.
     """
     dt, speed = moved.sample_time_s, np.abs(moved.velocity_m_s)
-    force = _averaged(moved.pushing_n, FORCE_SAMPLES)
     rest = round(LEAST_REST_S / dt)
-    rested = np.flatnonzero(_averaged(1.0 * (speed < RESTING_M_S), rest) > 0.95)
+    rested = np.flatnonzero(averaged(1.0 * (speed < RESTING_M_S), rest) > 0.95)
     starts = np.flatnonzero((speed[1:] > MOVING_M_S) & (speed[:-1] <= MOVING_M_S)) + 1
     found, last = [], 0
     for start in starts:
@@ -120,13 +140,13 @@ def break_aways(moved: Motion) -> tuple[BreakAway, ...]:
         if not len(since) or (start - since[-1]) * dt > LONGEST_CREEP_S:
             continue
         forward = bool(moved.velocity_m_s[start] > 0)
-        near = force[since[-1] : start + 1]
-        size = float(np.max(near if forward else -near))
+        near = moved.friction_n(forward, FORCE_SAMPLES)[since[-1] : start + 1]
+        size = float(np.max(near))
         found.append(BreakAway(float(moved.position_m[since[-1]]), forward, size))
     return tuple(found)
 
 
-def _averaged(values: np.ndarray, width: int) -> np.ndarray:
+def averaged(values: np.ndarray, width: int) -> np.ndarray:
     """Moving mean, shorter at the ends."""
     window = np.ones(min(width, len(values)))
     count = np.convolve(np.ones(len(values)), window, mode="same")

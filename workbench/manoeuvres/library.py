@@ -24,6 +24,7 @@ from workbench.manoeuvres.play import (
     zigzag,
 )
 
+REST_S = 0.5  # before a ramp, which begins where the command rests
 BEYOND = 0.1  # of what was recorded: how far a reference goes beyond a stop
 
 # Positions, through a position loop.
@@ -99,8 +100,9 @@ def end_to_end(limits: Limits, share: float, size: float) -> Play:
 
 def command_ramp(limits: Limits, share: float, size: float) -> Play:
     """Rest, then a slow triangle of the command through its centre and back, twice."""
-    phase = 2.0 * limits.time_s / limits.time_s[-1]
-    return commanded(limits, share * size * (2.0 * zigzag(phase) - 1.0))
+    time_s = limits.time_s
+    phase = 2.0 * np.maximum(time_s - REST_S, 0.0) / (time_s[-1] - REST_S)
+    return commanded(limits, share * size * (2.0 * zigzag(0.25 + phase) - 1.0))
 
 
 def command_steps(limits: Limits, share: float, dwell_s: float) -> Play:

@@ -7,7 +7,7 @@ recorded, or the supply.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from math import inf, isfinite
@@ -42,7 +42,7 @@ class Drive(Enum):
 class Axis:
     """A position or angle that one command moves; all in SI.
 
-    start       where the plant's own initial state has it
+    start       where its first recording begins: a manoeuvre begins there too
     low, high   where recordings have been
     speed       fastest recorded
     stops       ends of the stroke, infinite where the plant has none
@@ -68,12 +68,16 @@ class Limits:
         One per command where commands move positions, else empty.
     highest_pa
         Of the measured pressures.
+    begun
+        Where the first recording begins, of each measured quantity but speeds; empty where commands
+        are switched: what is not recorded of such a plant, as a gear, would not fit to it.
     """
 
     drive: Drive
     commands: tuple[Signal, ...]
     axes: tuple[Axis, ...]
     highest_pa: float
+    begun: Mapping[str, float]
     sample_time_s: float
     samples: int
 
@@ -115,10 +119,18 @@ def limits_of(plant: Plant, recordings: Sequence[Recording]) -> Limits:
     outputs = [name for name in plant.measured if name.endswith(POSITIONS)]
     switched = any(signal.levels for signal in commands)
     moves = not switched and len(outputs) == len(commands)
+    begun = {} if switched else _begun(plant, recordings[0])
     axes = tuple(_axis(plant, name, recordings) for name in outputs) if moves else ()
     drive = Drive.SWITCHED if switched else Drive.POSITION if axes else Drive.PRESSURE
     samples = min(round(DURATION_S / dt), MOST_SAMPLES)
-    return Limits(drive, commands, axes, _highest_pa(plant, recordings), dt, samples)
+    return Limits(drive, commands, axes, _highest_pa(plant, recordings), begun, dt, samples)
+
+
+def _begun(plant: Plant, recording: Recording) -> dict[str, float]:
+    """The first value of what is measured: a manoeuvre begins from rest, so of no speed."""
+    names = [name for name in plant.measured if name.endswith((*POSITIONS, "pressure_pa"))]
+    rows = ((name, recording[name][np.isfinite(recording[name])]) for name in names)
+    return {name: float(values[0]) for name, values in rows if len(values)}
 
 
 def _bounded(signal: Signal, recordings: Sequence[Recording]) -> Signal:
@@ -140,8 +152,7 @@ def _range(name: str, recordings: Sequence[Recording]) -> tuple[float, float]:
 def _axis(plant: Plant, output: str, recordings: Sequence[Recording]) -> Axis:
     low, high = _range(output, recordings)
     speed = max(_fastest(piece[output], r.sample_time_s) for r in recordings for piece in r.pieces)
-    states = dict(zip(plant.state_list, plant.initial, strict=True))
-    start = float(np.clip(states.get(output, (low + high) / 2), low, high))
+    start = _begun(plant, recordings[0]).get(output, (low + high) / 2)
     return Axis(output, start, low, high, speed, stops_of(plant, output))
 
 

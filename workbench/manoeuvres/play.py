@@ -9,7 +9,7 @@ import numpy as np
 
 from workbench.manoeuvres.limits import Drive, Limits
 
-LEAD_S = 1.0  # in which a reference leaves the position where the plant starts
+LEAD_S = 1.0  # in which a reference leaves the position where it starts
 SEED = 5  # of steps and phases: the same manoeuvre every time
 
 

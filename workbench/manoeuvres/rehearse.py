@@ -13,12 +13,13 @@ own: a loop hides what tells them apart unless the commands are compared too (di
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from workbench.called import called, result
 from workbench.effects.timing import sent_at_s
+from workbench.filtering import consistent_start
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.window_runs import THREADS
 from workbench.manoeuvres.limits import Axis, Limits
@@ -52,8 +53,8 @@ def rehearse(
 ) -> list[Recording]:
     """What a fitted plant would record of each play: commands, measured inputs and outputs.
 
-    It starts from the plant's own initial state.  ``maps`` are those of the axes: one loop serves
-    all rivals.
+    It starts where the first recording does, at rest: elsewhere a limit may be broken before
+    anything is played.  ``maps`` are those of the axes: one loop serves all rivals.
     """
     if not plays:
         return []
@@ -72,7 +73,10 @@ def rehearse(
 
 
 def speed_maps(fit: Fit, limits: Limits) -> list[SpeedMap]:
-    """The speed map of each axis, other commands at rest."""
+    """The speed map of each axis from the middle of its range on, other commands at rest.
+
+    From an end of the stroke, where many a recording begins, it would move one way only.
+    """
     places = np.linspace(-1.0, 1.0, PROBED)
     sizes = places * np.abs(places)  # close to the centre, where dead zones end
     samples = BLOCK * max(round(PROBE_S / limits.sample_time_s / BLOCK), 1)
@@ -84,7 +88,8 @@ def speed_maps(fit: Fit, limits: Limits) -> list[SpeedMap]:
         up, down = signal.upper - signal.nominal, signal.nominal - signal.lower
         levels = signal.nominal + np.where(sizes > 0, up, down) * sizes
         commands[:, k] = levels[:, None]
-        batch = _Batch(fit, limits, PROBED)
+        middle = {**limits.begun, axis.output: (axis.low + axis.high) / 2}
+        batch = _Batch(fit, replace(limits, begun=middle), PROBED)
         for first in range(0, samples, BLOCK):
             batch.advance(commands, slice(first, first + BLOCK))
         row = fit.windows.plant.measured.index(axis.output)
@@ -137,7 +142,7 @@ def _loop(
 
 
 class _Batch:
-    """A fitted plant run from its initial state under several command sequences side by side."""
+    """A fitted plant run under several command sequences side by side, from where limits begin."""
 
     def __init__(self, fit: Fit, limits: Limits, n: int) -> None:
         self.plant, self.limits, self.n = fit.plant, limits, n
@@ -147,7 +152,7 @@ class _Batch:
         self.block, self.h = block.map(n, "thread", THREADS), self.model.h.map(n)
         self.p = np.tile(self.plant.nominal[2][:, None], n)
         self.d = np.array([*self.channels.values()]).reshape(-1, 1)
-        self.x = np.tile(self.plant.initial[:, None], (1, n))
+        self.x = np.tile(consistent_start(self.plant, limits.begun)[:, None], (1, n))
         time_s = limits.time_s
         sent_s = [sent_at_s(self.plant.members, name, time_s) for name in self.model.commands]
         self.late = {k: sent for k, sent in enumerate(sent_s) if sent is not time_s}

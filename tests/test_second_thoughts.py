@@ -1,0 +1,45 @@
+"""Backward and swap pass where effects hang on each other: one needs another, or came on top."""
+
+import pytest
+from test_diagnosis import bench, coulomb, nothing
+from test_improvement import BARE, steps_of
+
+from studies.improvement_text import improvement_text
+from workbench.diagnosis import improve as improvement
+from workbench.diagnosis import passes as passing
+from workbench.diagnosis.diagnose import diagnose, silent
+from workbench.diagnosis.improve import improve
+from workbench.diagnosis.passes import Passes
+from workbench.diagnosis.rounds import Rounds
+from workbench.rig import load_rig
+
+SETS = [bench(1, coulomb, 5.0), bench(3, coulomb, 5.0, 1e5)], [bench(2, coulomb, 5.0, 4e5)]
+BLANK = [bench(1, nothing), bench(3, nothing, 0.0, 1e5)], [bench(2, nothing, 0.0, 4e5)]
+
+
+@pytest.fixture(scope="module")
+def rig():
+    return load_rig(BARE)
+
+
+def test_no_rival_takes_the_place_of_what_a_kept_effect_needs(rig, monkeypatch):
+    """Static friction is what Coulomb's is exceeded by: without it, it means nothing."""
+    monkeypatch.setattr(passing, "clearly_better", lambda *asked: True)
+    kept = steps_of(rig, SETS, "coulomb_friction", "stiction")
+    passes = Passes(rig, *SETS, {"coulomb_friction": diagnose(rig, *SETS)}, silent)
+
+    assert passes._rivals(kept, kept.steps[0])
+    assert passes.swaps(kept, kept.steps[0]) == ([], kept)
+
+
+def test_what_is_left_alone_is_asked_against_the_rig_as_it_came(rig, monkeypatch):
+    """Neither is needed; the second was judged on top of the first alone."""
+    kept = steps_of(rig, BLANK, "viscous_friction", "constant_force")
+    done = Rounds(rig, kept=kept, steps=kept.steps).told(diagnose(rig, *BLANK))
+    monkeypatch.setattr(improvement, "forward", lambda *asked: done)
+    found = improve(rig, *BLANK)
+
+    assert [each.candidate.name for each in found.removals] == list(kept.names)
+    assert all(each.dropped and each.reasons for each in found.removals)
+    assert found.kept == () and found.rig is rig
+    assert "constant_force" in improvement_text(found, {"rod.force": "rod.force_n"})
