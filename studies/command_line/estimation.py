@@ -52,7 +52,7 @@ def estimate(
         from studies.text_of_estimates import estimates_document, estimates_text
         from workbench.rig import load_rig
 
-        writable(json, folders=[figures])
+        writable(json, folders=[figures], reads=[rig, *recordings])
         known = load_rig(rig)
         names = [name.strip() for name in with_.split(",")] if with_ else USUAL
         read = read_all(known, recordings, say)
