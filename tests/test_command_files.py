@@ -81,7 +81,7 @@ ONTO_WHAT_IT_READS = [
     ("fit", ["run.csv", "--validate", "commands.csv", "-o", "commands.csv"], "commands.csv"),
     ("add", ["valve_lag", "--fit", "run.csv", "-o", "run.csv"], "run.csv"),
     ("improve", ["run.csv", "--validate", "run.csv", "-o", "run.csv"], "run.csv"),
-    ("improve", "run.csv --validate run.csv -o new.toml --json rig.toml".split(), "rig.toml"),
+    ("improve", ["run.csv", "--validate", "run.csv", "-o", "new.toml", "--json", "rig.toml"], "rig.toml"),
     ("diagnose", ["run.csv", "--json", "rig.toml"], "rig.toml"),
     ("estimate", ["run.csv", "--json", "run.csv"], "run.csv"),
     ("modes", ["--json", "rig.toml"], "rig.toml"),
