@@ -134,6 +134,34 @@ def test_a_sensor_that_sticks_or_saturates_is_warned_of(tmp_path):
         read(tmp_path, text(rows))
 
 
+@pytest.mark.parametrize(
+    ("factor", "unit", "said"),
+    [
+        (1.0, "ms", r"400 samples 1e-06 s apart, 0\.000399 s long, look like times in s; expected"),
+        (1e3, "s", r"1 s apart, 399 s long, look like times in ms or sample numbers; expected "),
+        (1e3, "s", r'expected unit = "ms" or step = "\.\.\." for its column'),
+        (1e6, "s", "look like times in us; expected"),
+        (1e6, "ms", "look like times in us; expected"),
+    ],
+)
+def test_times_in_another_unit_than_the_rig_says_are_warned_of(tmp_path, factor, unit, said):
+    rows = table()
+    rows[:, 0] = np.round(factor * rows[:, 0], 9)
+    rig = RIG.replace('unit = "s"', f'unit = "{unit}"')
+
+    with pytest.warns(RecordingWarning, match=said):
+        read(tmp_path, text(rows), rig=rig)
+
+
+@pytest.mark.parametrize(("factor", "unit"), [(1.0, "s"), (1e3, "ms"), (100.0, "s"), (0.1, "s")])
+@pytest.mark.filterwarnings("error")
+def test_an_ordinary_clock_is_not_warned_of(tmp_path, factor, unit):
+    rows = table()
+    rows[:, 0] = np.round(factor * rows[:, 0], 9)
+
+    read(tmp_path, text(rows), rig=RIG.replace('unit = "s"', f'unit = "{unit}"'))
+
+
 def test_a_file_that_is_not_there_names_its_neighbour(tmp_path):
     (tmp_path / "run1.csv").write_text("x")
 

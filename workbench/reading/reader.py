@@ -16,6 +16,7 @@ from workbench.reading.matlab import matlab_table
 from workbench.reading.plausible import cannot_be, warn_of_sensors
 from workbench.reading.table import RecordingWarning, Table
 from workbench.reading.text_table import text_table
+from workbench.reading.time_unit import warn_of_time_unit
 from workbench.recording import Recording
 from workbench.recording_format import derived_channels
 from workbench.rig import Rig
@@ -51,6 +52,8 @@ def read_recording(rig: Rig, path: Path | str) -> Recording:
         resample_s=rig.reader.resample_s,
         least=WINDOW if derived else 2,
     )
+    if "time" in columns:
+        warn_of_time_unit(raw[columns["time"]], rig.reader.time.unit, table.file)
     channels = {name: grid.on(values) for name, values in channels.items()}
     for velocity, position in derived.items():
         channels[velocity] = derivative(channels[position], grid.sample_time_s, grid.starts)
