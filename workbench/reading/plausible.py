@@ -13,6 +13,7 @@ from workbench.plant import Plant
 from workbench.reading.table import RecordingWarning
 from workbench.recording import Recording
 from workbench.rig import AMBIENT, Rig
+from workbench.saturation import LIVELY, saturated
 from workbench.units import display_unit, public_name, scale, si_unit, suffix
 
 LIMITS = {
@@ -40,7 +41,6 @@ SUPPLY = "supply.pressure_pa"
 ROOM = 0.25  # a chamber goes that far below ambient and above supply, as shares of each
 BEYOND = 1.5  # of the range of a command: more cannot be that command
 RUN = 50  # equal values in a row that make a sensor suspect, where it usually changes
-LIVELY = 0.2  # share of unchanged samples below which a channel usually changes
 
 
 def cannot_be(
@@ -104,18 +104,31 @@ def warn_of_sensors(channels: Mapping[str, np.ndarray], outputs: set[str], file:
     """Warn of sensors that stand still, or sit at the end of their range, for a while."""
     for name in outputs & channels.keys():
         values = channels[name]
-        stretch = stuck_stretch(values)
-        if stretch is None:
-            continue
-        first, length = stretch
-        at_end = values[first] in (np.nanmin(values), np.nanmax(values))
-        shown = scale(display_unit(name), name).from_si(values[first])
-        warnings.warn(
-            f"{file}: {public_name(name)}: {'saturated' if at_end else 'stuck'} at "
-            f"{shown:.5g} {display_unit(name)} for {length} samples from sample {first + 1} on",
-            RecordingWarning,
-            stacklevel=3,
-        )
+        at_ends = saturated(name, values)
+        said = [saturation_text(name, values, at_ends)] if at_ends.any() else []
+        stretch = stuck_stretch(np.where(at_ends, np.nan, values))
+        if stretch is not None:
+            first, length = stretch
+            at_end = values[first] in (np.nanmin(values), np.nanmax(values))
+            said += [
+                f"{'saturated' if at_end else 'stuck'} at {_shown(name, values[first])} for "
+                f"{length} samples from sample {first + 1} on"
+            ]
+        for each in said:
+            text = f"{file}: {public_name(name)}: {each}"
+            warnings.warn(text, RecordingWarning, stacklevel=3)
+
+
+def saturation_text(name: str, values: np.ndarray, at_ends: np.ndarray) -> str:
+    """At which values a sensor is saturated, and in which share of the samples."""
+    ends = " and ".join(_shown(name, end) for end in np.unique(values[at_ends]))
+    count, seen = int(at_ends.sum()), int(np.isfinite(values).sum())
+    first = int(at_ends.argmax()) + 1
+    return f"saturated at {ends} in {count} samples ({count / seen:.1%}) from sample {first} on"
+
+
+def _shown(name: str, value: float) -> str:
+    return f"{scale(display_unit(name), name).from_si(value):.5g} {display_unit(name)}".rstrip()
 
 
 def stuck_stretch(values: np.ndarray) -> tuple[int, int] | None:
