@@ -134,6 +134,13 @@ def test_a_sensor_that_sticks_or_saturates_is_warned_of(tmp_path):
         read(tmp_path, text(rows))
 
 
+def test_a_column_read_by_name_and_by_number_feeds_one_signal(tmp_path):
+    rig = RIG.replace('"position_mm"', "3").replace('unit = "mm"', 'unit = "cm"')
+
+    said = refused(tmp_path, text(table()), rig=rig)
+    assert "slide.position: column 3 is that of chamber_a.pressure already; expected a" in said
+
+
 @pytest.mark.parametrize(
     ("factor", "unit", "said"),
     [

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from workbench.errors import InputError
 from workbench.plants import PLANTS
 from workbench.recording import Recording
+from workbench.recording_format import channel_names
 from workbench.rig import Rig, default_rig, load_rig
 from workbench.rig_writing import rig_text, write_rig
 
@@ -135,6 +136,19 @@ def test_a_default_rig_is_the_plant_itself():
             '[recording.channels]\n"slide.position" = { column = 1, unit = "m" }',
             "servo_drive also needs valve.command",
         ),
+        (
+            "[recording.channels]\n"
+            '"valve.command" = { column = "u", unit = "V" }\n'
+            '"chamber_a.pressure" = { column = "p", unit = "bar" }\n'
+            '"chamber_b.pressure" = { column = "p", unit = "bar" }',
+            'rig:5: chamber_b.pressure: column "p" is that of chamber_a.pressure already; expected '
+            "a column of its own",
+        ),
+        (
+            '[recording]\ntime = { column = 1, unit = "s" }\n'
+            '[recording.channels]\n"valve.command" = { column = 1, unit = "V" }',
+            "rig:5: valve.command: column 1 is that of time already",
+        ),
         ("[values", "rig:2: "),
     ],
 )
@@ -187,6 +201,18 @@ def test_a_written_rig_reads_back_the_same(tmp_path):
 
     assert load_rig(tmp_path / "out.toml") == replace(rig, path=tmp_path / "out.toml")
     assert [p.name for p in tmp_path.iterdir()] == ["out.toml"]
+
+
+@pytest.mark.parametrize("word", ["true", "false"])
+@pytest.mark.parametrize("channel", ["supply.pressure", "slide.position"])
+def test_whether_a_channel_is_optional_survives_writing(channel, word):
+    head, section, channels = TEXT.partition("[recording.channels]\n")
+    told = f", optional = {word} }}"
+    rows = [row.replace(" }", told) if channel in row else row for row in channels.splitlines()]
+    rig = load_rig(head + section + "\n".join(rows))
+
+    assert word == str(rig.reader.channels[channel_names(rig.plant)[channel]].optional).lower()
+    assert load_rig(rig_text(rig)).reader == rig.reader
 
 
 @st.composite

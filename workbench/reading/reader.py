@@ -110,9 +110,21 @@ def _columns(rig: Rig, table: Table) -> dict[str, int]:
             found["time"] = number
         else:
             wrong.insert(0, number)
+    wrong += _shared(table, found)
     if wrong:
         raise InputError(*wrong)
     return found
+
+
+def _shared(table: Table, columns: dict[str, int]) -> list[Message]:
+    """Columns that the rig reads as two signals, one by its name and one by its number."""
+    wrong, first = [], {}
+    for name, number in columns.items():
+        other = first.setdefault(number, name)
+        if other != name:
+            what = f"column {number + 1} is that of {public_name(other)} already"
+            wrong.append(Message(what, public_name(name), "a column of its own", file=table.file))
+    return wrong
 
 
 def _require_units(rig: Rig, table: Table, columns: dict[str, int]) -> None:
