@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from workbench.diagnosis.absent import require_place
 from workbench.errors import InputError
 from workbench.plants import PLANTS
 from workbench.recording import Recording
@@ -263,6 +264,21 @@ def test_the_plant_takes_the_inputs_and_outputs_that_a_recording_carries():
     assert plant is rig.fit_for(
         recording("valve.command_v", "supply.pressure_pa", "slide.position_m")
     )
+
+
+def test_an_effect_whose_product_is_recorded_is_refused_with_the_reason():
+    rig = default_rig("servo_drive")
+    plant = rig.fit_for(recording("valve.command_v", "supply.pressure_pa", "slide.position_m"))
+
+    with pytest.raises(InputError) as refused:
+        require_place(rig, plant, ["supply_droop"])
+    assert str(refused.value) == (
+        "supply_droop: is not applicable: supply.pressure is measured; expected recordings without "
+        "that channel; take it out of [recording.channels]"
+    )
+    require_place(rig, rig.plant, ["supply_droop"])
+    with pytest.raises(InputError, match="did you mean valve_lag"):
+        require_place(rig, plant, ["valve_lagg"])
 
 
 @pytest.mark.parametrize(
