@@ -17,7 +17,7 @@ from studies.command_line.application import (
 )
 from studies.command_line.files import read_all, writable, write_json
 
-IDENTIFY = "workbench identify friction drive.toml run_*.csv -o drive2.toml --figures figures"
+IDENTIFY = "workbench identify friction drive4.toml run_*.csv stick_*.csv -o drive5.toml"
 
 
 @app.command(cls=Spread, epilog=example(IDENTIFY))
