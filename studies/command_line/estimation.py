@@ -54,7 +54,7 @@ def estimate(
 
         writable(json, folders=[figures], reads=[rig, *recordings])
         known = load_rig(rig)
-        names = [name.strip() for name in with_.split(",")] if with_ else USUAL
+        names = [name.strip() for name in with_.split(",")] if with_ is not None else USUAL
         read = read_all(known, recordings, say)
         found = estimate_rig(known, read, names, hide or "", say)
         write_json(json, estimates_document(known.name, found))

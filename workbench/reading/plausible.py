@@ -51,6 +51,8 @@ def cannot_be(
     size, kind = max(abs(low), abs(high)), public_name(name)
     least, most = LIMITS.get(suffix(name), (0.0, np.inf))
     for signal in plant.commands:
+        if signal.name == name and signal.levels:
+            return _no_level(kind, raw, si, signal.levels, file)
         if signal.name == name and np.isfinite(signal.upper):
             most = BEYOND * max(abs(signal.upper), abs(signal.lower))
     if unit.endswith("_gauge"):
@@ -69,6 +71,19 @@ def cannot_be(
         what = f"an absolute pressure of {low / 1e5:.3g} bar cannot be"
         return Message(what, kind, f"'{unit}_gauge' if it counts from ambient", file=file)
     return None
+
+
+def _no_level(
+    kind: str, raw: np.ndarray, si: np.ndarray, levels: Sequence[float], file: str
+) -> Message | None:
+    """What a switched command cannot be: anything between or beyond its levels."""
+    off = np.isfinite(si) & ~np.isclose(si[:, None], levels, atol=1e-6).any(axis=1)
+    if not off.any():
+        return None
+    first = int(off.argmax())
+    what = f"is {raw[first]:.4g} in sample {first + 1}"
+    more = f", and none of its levels in {off.sum()} samples" if off.sum() > 1 else ""
+    return Message(what + more, kind, " or ".join(f"{level:g}" for level in levels), file=file)
 
 
 def _ten_times(name: str, si: np.ndarray, unit: str, plant: Plant) -> str:
