@@ -16,7 +16,7 @@ of filters); here the mode is known by its box and its guards, not by likelihood
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,7 +24,7 @@ import numpy as np
 from estimators.scheduled_kalman import ScheduledKalman
 from estimators.wrapped import Wrapped
 from workbench.contracts import Estimate, Estimator
-from workbench.errors import Message, UnknownNameError
+from workbench.errors import Message, UnknownNameError, nearest
 
 NEXT, AT = ",", "@"
 
@@ -76,6 +76,13 @@ def names_of(choice: str) -> tuple[str, ...]:
     return tuple(part.partition(AT)[0].strip() for part in choice.split(NEXT))
 
 
+def _phrases(names: Sequence[str], count: int) -> list[str]:
+    """So many words in a row, of any of these names."""
+    every = [name.split() for name in names]
+    found = (" ".join(ws[k : k + count]) for ws in every for k in range(len(ws) - count + 1))
+    return [*dict.fromkeys(found)] if count else []
+
+
 def chosen_per_mode(
     choice: str, finder: ScheduledKalman, make: Callable[[str], Estimator]
 ) -> Estimator:
@@ -102,7 +109,9 @@ def chosen_per_mode(
         fits = [k for k, mode in enumerate(known) if f" {words} " in f" {mode} "]
         if not words or not fits:
             what = f"{part.strip()!r} is for no mode; they are {', '.join(known)}"
-            raise UnknownNameError(Message(what, expected=f"words of one, as {name}@{known[0]}"))
+            near = nearest(words, _phrases(known, len(words.split())))
+            near = f"{name}{AT}{near}" if near else ""
+            raise UnknownNameError(Message(what, "", f"words of one, as {name}@{known[0]}", near))
         speaks[fits] = different.index(name)
     if AT in parts[0]:
         what = f"{parts[0].strip()!r} comes first, which is for all other modes"

@@ -68,8 +68,8 @@ def estimate_rig(
     names = tuple(names)
     for name in names:
         if name not in ESTIMATORS:
-            known = listed(ESTIMATORS)
-            raise InputError(Message("is no estimator", name, known, nearest(name, ESTIMATORS)))
+            known, told = f"one of {listed(ESTIMATORS)}", name or "an empty name"
+            raise InputError(Message("is no estimator", told, known, nearest(name, ESTIMATORS)))
     return tuple(_Bench(rig, each, hide, say).compared(names) for each in recordings)
 
 

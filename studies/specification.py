@@ -231,12 +231,12 @@ def _figures(
             figure = "overshoot_share"
         if found := _quantity(text, (name,), rig, figure, typed):
             most, unit, shown_in = found
-            if most < 0.0 or (figure == "switches" and most != round(most)):
-                whole = "a whole number" if figure == "switches" else "a quantity"
-                text.wrong((name,), f"is {typed}", expected=f"{whole} from 0")
             if si_unit(figure) == "s" and not 0.0 < most <= LONGEST_S:
                 expected = f"a time above 0, to {LONGEST_S:g} s"
                 text.wrong((name,), f"is {typed}", expected=expected)
+            elif most < 0.0 or (figure == "switches" and most != round(most)):
+                whole = "a whole number" if figure == "switches" else "a quantity"
+                text.wrong((name,), f"is {typed}", expected=f"{whole} from 0")
             yield Asked(name, figure, -inf, most, tuple(scenarios), unit, shown_in)
 
 

@@ -2,11 +2,14 @@
 
 import numpy as np
 import pytest
-from recording_files import RIG, N, read, refused, table, text
+from recording_files import NAMES, RIG, N, read, refused, table, text
 
 from workbench.errors import InputError
 from workbench.reading import RecordingWarning, read_recording
 from workbench.rig import load_rig
+
+ON_OFF = """"valve_1.command" = { column = "command_V", unit = "" }
+"valve_2.command" = { column = "command_2", unit = "" }"""
 
 
 def _cell(row: int, column: int, value: str):
@@ -22,6 +25,8 @@ def _cell(row: int, column: int, value: str):
 BAD = {
     "empty file": (lambda s: " \n", "", "run.csv: the file is empty"),
     "no text": (lambda s: "PK\3\4\0\0" + s, "", "is no text; expected a CSV or MAT file"),
+    "picture": (lambda s: "\x89PNG\r\n\x1a\n\x01\x02IHDR" + s, "", "is no text; expected a CSV"),
+    "spoiled cell": (_cell(9, 2, "\x00\x07" * 50), "", "'\\x00\\x07"),
     "names only": (lambda s: s.split("\n")[0], "", "no rows of numbers"),
     "no names": (lambda s: s.split("\n", 1)[1], "", "run.csv:1: the first row holds numbers"),
     "missing column": (
@@ -132,6 +137,65 @@ def test_a_sensor_that_sticks_or_saturates_is_warned_of(tmp_path):
 
     with pytest.warns(RecordingWarning, match=r"chamber_a\.pressure: saturated at 6\.0"):
         read(tmp_path, text(rows))
+
+
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [
+        (7.0, "valve_1.command: is 7 in sample 12; expected 0 or 1"),
+        (0.5, "valve_1.command: is 0.5 in sample 12; expected 0 or 1"),
+        (1.0, None),
+    ],
+)
+def test_a_switched_command_is_at_one_of_its_levels(tmp_path, value, said):
+    rig = RIG.replace("servo_drive", "gearbox").replace("slide", "main_piston")
+    rig = rig.replace('"valve.command" = { column = "command_V", unit = "V" }', ON_OFF)
+    rig = rig.replace("chamber_a", "chamber_1")
+    rows = table()
+    rows[:, 1] = np.arange(N) % 100 < 50
+    rows = np.column_stack([rows, rows[:, 1]])
+    rows[11, 1] = value
+    content = text(rows, head=",".join([*NAMES, "command_2"]))
+
+    if said is None:
+        assert len(read(tmp_path, content, rig=rig)) == N
+    else:
+        assert said in refused(tmp_path, content, rig=rig)
+
+
+def test_a_column_read_by_name_and_by_number_feeds_one_signal(tmp_path):
+    rig = RIG.replace('"position_mm"', "3").replace('unit = "mm"', 'unit = "cm"')
+
+    said = refused(tmp_path, text(table()), rig=rig)
+    assert "slide.position: column 3 is that of chamber_a.pressure already; expected a" in said
+
+
+@pytest.mark.parametrize(
+    ("factor", "unit", "said"),
+    [
+        (1.0, "ms", r"400 samples 1e-06 s apart, 0\.000399 s long, look like times in s; expected"),
+        (1e3, "s", r"1 s apart, 399 s long, look like times in ms or sample numbers; expected "),
+        (1e3, "s", r'expected unit = "ms" or step = "\.\.\." for its column'),
+        (1e6, "s", "look like times in us; expected"),
+        (1e6, "ms", "look like times in us; expected"),
+    ],
+)
+def test_times_in_another_unit_than_the_rig_says_are_warned_of(tmp_path, factor, unit, said):
+    rows = table()
+    rows[:, 0] = np.round(factor * rows[:, 0], 9)
+    rig = RIG.replace('unit = "s"', f'unit = "{unit}"')
+
+    with pytest.warns(RecordingWarning, match=said):
+        read(tmp_path, text(rows), rig=rig)
+
+
+@pytest.mark.parametrize(("factor", "unit"), [(1.0, "s"), (1e3, "ms"), (100.0, "s"), (0.1, "s")])
+@pytest.mark.filterwarnings("error")
+def test_an_ordinary_clock_is_not_warned_of(tmp_path, factor, unit):
+    rows = table()
+    rows[:, 0] = np.round(factor * rows[:, 0], 9)
+
+    read(tmp_path, text(rows), rig=RIG.replace('unit = "s"', f'unit = "{unit}"'))
 
 
 def test_a_file_that_is_not_there_names_its_neighbour(tmp_path):

@@ -72,6 +72,66 @@ def test_everything_that_cannot_be_written_is_named_at_once(tmp_path):
     assert all(f"{tmp_path / 'file'} is a file" in line for line in said[1:]) and len(said) == 3
 
 
+HELD_OUT = ["run.csv", "--validate", "run.csv"]
+ONTO_WHAT_IT_READS = [
+    ("compare", ["run.csv", "--json", "run.csv"], "run.csv"),
+    ("compare", ["run.csv", "--json", "rig.toml"], "rig.toml"),
+    ("simulate", ["run.csv", "-o", "run.csv"], "run.csv"),
+    ("simulate", ["run.csv", "-o", "./rig.toml"], "rig.toml"),
+    ("fit", ["run.csv", "-o", "run.csv"], "run.csv"),
+    ("fit", ["run.csv", "--validate", "commands.csv", "-o", "commands.csv"], "commands.csv"),
+    ("add", ["valve_lag", "--fit", "run.csv", "-o", "run.csv"], "run.csv"),
+    ("improve", ["run.csv", "--validate", "run.csv", "-o", "run.csv"], "run.csv"),
+    ("improve", [*HELD_OUT, "-o", "new.toml", "--json", "rig.toml"], "rig.toml"),
+    ("diagnose", ["run.csv", "--json", "rig.toml"], "rig.toml"),
+    ("estimate", ["run.csv", "--json", "run.csv"], "run.csv"),
+    ("modes", ["--json", "rig.toml"], "rig.toml"),
+    ("design", ["--controller", "lq", "-o", "rig.toml"], "rig.toml"),
+    ("design", ["--controller", "lq", "--spec", "link.csv", "-o", "run.csv"], "run.csv"),
+    ("check", ["commands.csv", "--json", "commands.csv"], "commands.csv"),
+    ("check", ["commands.csv", "--keep", "rig.toml"], "rig.toml"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("command", "words", "named"), ONTO_WHAT_IT_READS)
+def test_no_command_writes_over_what_it_reads(folder, monkeypatch, tmp_path, command, words, named):
+    shutil.copytree(folder, tmp_path / "here")
+    monkeypatch.chdir(tmp_path / "here")
+    os.symlink("run.csv", "link.csv")
+    before = {path: path.read_bytes() for path in sorted((tmp_path / "here").iterdir())}
+
+    answer = call(command, "rig.toml", *words)
+
+    assert answer.exit_code == 2
+    told = f"{named}: is a file that this command reads; expected the name of another file to write"
+    assert answer.stderr == f"workbench: {told}\n"
+    assert {path: path.read_bytes() for path in sorted((tmp_path / "here").iterdir())} == before
+
+
+def test_identify_writes_over_no_recording(folder, monkeypatch):
+    monkeypatch.chdir(folder)
+    for words in (["-o", "run.csv"], ["--json", "rig.toml"]):
+        answer = call("identify", "friction", "rig.toml", "run.csv", *words)
+
+        assert answer.exit_code == 2
+        assert f"{words[1]}: is a file that this command reads" in answer.stderr
+
+
+def test_a_rig_may_be_bettered_in_its_own_file(folder):
+    rig, recording = folder / "rig.toml", folder / "run.csv"
+
+    writable(rig, reads=[recording, None])
+
+
+@pytest.mark.skipif(not os.path.isdir("/proc"), reason="a folder that takes no files")
+def test_a_folder_that_takes_no_file_is_refused_before_any_work(folder):
+    answer = call("compare", folder / "rig.toml", folder / "run.csv", "--json", "/proc/errors.json")
+
+    assert answer.exit_code == 2
+    assert "/proc/errors.json: cannot be written: /proc" in answer.stderr
+    assert "reading" not in answer.stderr
+
+
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
 def test_a_folder_that_may_not_be_written_is_refused(tmp_path):
     tmp_path.chmod(0o500)

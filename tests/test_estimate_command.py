@@ -122,6 +122,8 @@ def test_the_command_prints_tables_and_writes_json(place):
     ("words", "told"),
     [
         (("--with", "ekff"), "ekff: is no estimator"),
+        (("--with", "ekf,"), "an empty name: is no estimator; expected one of kalman, ekf"),
+        (("--with", ""), "an empty name: is no estimator"),
         (("--with", "ekf", "--hide", "chamber_leek@chamber_a"), "chamber_leak@chamber_a"),
     ],
 )

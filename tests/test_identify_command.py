@@ -1,6 +1,7 @@
 """The command `workbench identify`."""
 
 import json
+from pathlib import Path
 
 import pytest
 from commands import call
@@ -10,6 +11,9 @@ from studies.command_line import ORDER
 from studies.truth import dedicated as truth
 from workbench.identification import PROCEDURES
 from workbench.rig import load_rig
+
+README = Path(__file__).parent.parent / "README.md"
+FIGURES = " --figures figures"
 
 
 def test_identify_lists_every_procedure_with_its_recording():
@@ -35,6 +39,15 @@ def test_a_procedure_alone_is_told_how_it_is_done(name):
         assert part in said
     assert f"workbench identify {name}" in said
     assert max(map(len, answer.stdout.splitlines())) <= 100
+
+
+def test_the_commands_of_the_guides_are_the_chain_of_the_readme():
+    """Each takes the rig that the one before it wrote; the flow of a tank goes into a drive."""
+    lines = README.read_text(encoding="utf-8").splitlines()
+    rows = [line.split("`")[1] for line in lines if line.startswith("|") and "`identify " in line]
+    told = [f"identify {each.example.removesuffix(FIGURES)}" for each in PROCEDURES.values()]
+
+    assert sorted(told) == sorted(rows) and len(rows) == len(PROCEDURES)
 
 
 def test_identify_writes_a_rig_with_what_it_found(tmp_path):

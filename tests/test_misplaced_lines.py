@@ -36,6 +36,10 @@ DRIVE = default_rig("servo_drive")
             'settling_time = "1e300 s"',
             "spec:1: settling_time: is 1e300 s; expected a time above 0, to 3600 s",
         ),
+        (
+            'rise_time = "-150 ms"',
+            "spec:1: rise_time: is -150 ms; expected a time above 0, to 3600 s",
+        ),
         ("rise_time = nan", "spec:1: rise_time: 'nan' has no unit; expected \"1.5 s\""),
     ],
 )

@@ -5,6 +5,7 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -138,6 +139,15 @@ def test_the_replay_script_gives_the_rig_that_was_saved(session, folder):
     assert ran.returncode == 0, ran.stderr
     assert (folder / "better.toml").read_text() == kept
     assert "# workbench fit rig.toml train.csv -o rig_1.toml" in script(saved.actions)
+
+
+def test_a_rig_is_not_saved_over_a_recording(session):
+    path = session.files[0].opened.path
+    before = Path(path).read_bytes()
+
+    with pytest.raises(InputError, match="is a file that this command reads"):
+        save(session, path)
+    assert Path(path).read_bytes() == before
 
 
 def test_a_saved_rig_reads_back_and_the_session_goes_on_under_its_name(session, folder):

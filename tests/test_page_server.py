@@ -139,3 +139,22 @@ def test_without_bokeh_the_command_says_what_it_needs(monkeypatch):
 
     assert answer.exit_code == 2
     assert answer.stderr.count("\n") == 1 and "workbench[page]" in answer.stderr
+
+
+@pytest.mark.parametrize(
+    ("content", "said"), [(None, "there is no such file"), ("time\n", "no rows of numbers")]
+)
+def test_a_recording_that_cannot_be_read_is_refused_before_anything_is_served(
+    tmp_path, monkeypatch, content, said
+):
+    served = []
+    monkeypatch.setattr("studies.page.server.serve", lambda *given: served.append(given))
+    monkeypatch.setattr("studies.page.jobs.begin", lambda: None)
+    (tmp_path / "rig.toml").write_text('plant = "servo_drive"\n')
+    if content is not None:
+        (tmp_path / "run.csv").write_text(content)
+
+    answer = call("app", tmp_path / "rig.toml", tmp_path / "run.csv", "-q")
+
+    assert answer.exit_code == 2 and not served
+    assert said in answer.stderr and "reading" not in answer.stderr

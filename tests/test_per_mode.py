@@ -127,6 +127,8 @@ def test_an_estimator_speaks_in_the_modes_that_hold_its_words(plant):
     [
         ("ekf,ukf@nowhere", "is for no mode"),
         ("ekf,ukf", "is for no mode"),
+        ("ekf,ukf@stik", "did you mean 'ukf@stick'"),
+        ("ekf,ukf@stick midle", "did you mean 'ukf@stick middle'"),
         ("ekf@stick", "comes first"),
         ("ekf,unscented@stick", "no estimator unscented"),
     ],

@@ -7,9 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from workbench.diagnosis.absent import require_place
 from workbench.errors import InputError
 from workbench.plants import PLANTS
 from workbench.recording import Recording
+from workbench.recording_format import channel_names
 from workbench.rig import Rig, default_rig, load_rig
 from workbench.rig_writing import rig_text, write_rig
 
@@ -135,6 +137,19 @@ def test_a_default_rig_is_the_plant_itself():
             '[recording.channels]\n"slide.position" = { column = 1, unit = "m" }',
             "servo_drive also needs valve.command",
         ),
+        (
+            "[recording.channels]\n"
+            '"valve.command" = { column = "u", unit = "V" }\n'
+            '"chamber_a.pressure" = { column = "p", unit = "bar" }\n'
+            '"chamber_b.pressure" = { column = "p", unit = "bar" }',
+            'rig:5: chamber_b.pressure: column "p" is that of chamber_a.pressure already; expected '
+            "a column of its own",
+        ),
+        (
+            '[recording]\ntime = { column = 1, unit = "s" }\n'
+            '[recording.channels]\n"valve.command" = { column = 1, unit = "V" }',
+            "rig:5: valve.command: column 1 is that of time already",
+        ),
         ("[values", "rig:2: "),
     ],
 )
@@ -189,6 +204,18 @@ def test_a_written_rig_reads_back_the_same(tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["out.toml"]
 
 
+@pytest.mark.parametrize("word", ["true", "false"])
+@pytest.mark.parametrize("channel", ["supply.pressure", "slide.position"])
+def test_whether_a_channel_is_optional_survives_writing(channel, word):
+    head, section, channels = TEXT.partition("[recording.channels]\n")
+    told = f", optional = {word} }}"
+    rows = [row.replace(" }", told) if channel in row else row for row in channels.splitlines()]
+    rig = load_rig(head + section + "\n".join(rows))
+
+    assert word == str(rig.reader.channels[channel_names(rig.plant)[channel]].optional).lower()
+    assert load_rig(rig_text(rig)).reader == rig.reader
+
+
 @st.composite
 def rigs(draw) -> Rig:
     """Drives with any values within the bounds, and any causes added or removed."""
@@ -237,6 +264,21 @@ def test_the_plant_takes_the_inputs_and_outputs_that_a_recording_carries():
     assert plant is rig.fit_for(
         recording("valve.command_v", "supply.pressure_pa", "slide.position_m")
     )
+
+
+def test_an_effect_whose_product_is_recorded_is_refused_with_the_reason():
+    rig = default_rig("servo_drive")
+    plant = rig.fit_for(recording("valve.command_v", "supply.pressure_pa", "slide.position_m"))
+
+    with pytest.raises(InputError) as refused:
+        require_place(rig, plant, ["supply_droop"])
+    assert str(refused.value) == (
+        "supply_droop: is not applicable: supply.pressure is measured; expected recordings without "
+        "that channel; take it out of [recording.channels]"
+    )
+    require_place(rig, rig.plant, ["supply_droop"])
+    with pytest.raises(InputError, match="did you mean valve_lag"):
+        require_place(rig, plant, ["valve_lagg"])
 
 
 @pytest.mark.parametrize(

@@ -105,9 +105,10 @@ def read_format(text: RigText, plant: Plant) -> RecordingFormat:
     section = text.table("recording")
     known = "time channels header skip separator decimal thousands resample gaps"
     text.keys_among(("recording",), section, known.split())
+    time = _time(text)
     return RecordingFormat(
-        time=_time(text),
-        channels=_channels(text, plant) if "channels" in section else usual.channels,
+        time=time,
+        channels=_channels(text, plant, time) if "channels" in section else usual.channels,
         header=text.typed(("recording", "header"), bool, True, "true or false"),
         skip=_skip(text),
         separator=_character(text, "separator", SEPARATORS),
@@ -118,8 +119,9 @@ def read_format(text: RigText, plant: Plant) -> RecordingFormat:
     )
 
 
-def format_lines(reader: RecordingFormat) -> list[str]:
-    """The ``[recording]`` section that reads back to the same format."""
+def format_lines(reader: RecordingFormat, plant: Plant) -> list[str]:
+    """The ``[recording]`` section that reads back to the same format for this plant."""
+    optional = optional_channels(plant)
     words = {value: key for key, value in SEPARATORS.items()}
     lines = ["[recording]"]
     if reader.time.step_s is not None:
@@ -140,7 +142,8 @@ def format_lines(reader: RecordingFormat) -> list[str]:
         entry = f"column = {_column_text(channel.column)}, unit = {quoted(channel.unit)}"
         if channel.noise is not None:
             entry += f", noise = {quoted(written(channel.noise, name))}"
-        entry += ", optional = true" if channel.optional else ""
+        if channel.optional != (name in optional):
+            entry += f", optional = {str(channel.optional).lower()}"
         lines.append(f"{quoted(public_name(name))} = {{ {entry} }}")
     return lines
 
@@ -166,7 +169,7 @@ def _time(text: RigText) -> TimeFormat:
     return TimeFormat(_column(text, place, entry, "time"), unit)
 
 
-def _channels(text: RigText, plant: Plant) -> dict[str, ChannelFormat]:
+def _channels(text: RigText, plant: Plant, time: TimeFormat) -> dict[str, ChannelFormat]:
     names, found = channel_names(plant), {}
     optional = optional_channels(plant)
     for public, entry in text.table("recording", "channels").items():
@@ -185,7 +188,22 @@ def _channels(text: RigText, plant: Plant) -> dict[str, ChannelFormat]:
     if missing and not text.messages:
         missing_names = listed(sorted(map(public_name, missing)))
         text.wrong(("recording", "channels"), f"{plant.name} also needs {missing_names}")
+    _require_own_columns(text, found, time)
     return found
+
+
+def _require_own_columns(
+    text: RigText, channels: Mapping[str, ChannelFormat], time: TimeFormat
+) -> None:
+    """Note every column that two signals are read from: no sensor measures both."""
+    first = {} if time.column is None else {time.column: "time"}
+    for name, channel in channels.items():
+        public = public_name(name)
+        other = first.setdefault(channel.column, public)
+        if other != public:
+            what = f"column {_column_text(channel.column)} is that of {other} already"
+            place = ("recording", "channels", public)
+            text.wrong(place, what, expected="a column of its own")
 
 
 def _channel(

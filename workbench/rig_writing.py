@@ -40,7 +40,7 @@ def rig_text(rig: Rig, folder: Path | None = None) -> str:
         lines += ["", "[fixed]", f"names = {_list(sorted(map(public_name, rig.fixed)))}"]
     lines += seen_lines(rig.seen)
     if rig.reader != default_format(own):
-        lines += ["", *format_lines(rig.reader)]
+        lines += ["", *format_lines(rig.reader, own)]
     return "\n".join(lines) + "\n"
 
 

@@ -82,7 +82,7 @@ def check(
         from studies.tables import noted_tables
         from workbench.rig import load_rig
 
-        writable(json, keep, folders=[figures])
+        writable(json, keep, folders=[figures], reads=[rig, design, spec])
         where = workers_of(workers or (1 if runs == 1 and not scheduler else None), scheduler)
         known = load_rig(rig)
         asked = _asked(spec, known, scenario or ()) if spec else None

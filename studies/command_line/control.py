@@ -64,7 +64,7 @@ def modes(
         from studies.modes_text import modes_text
         from workbench.rig import load_rig
 
-        writable(json, folders=[export])
+        writable(json, folders=[export], reads=[rig, cuts, *(place or ())])
         limits = trusted(horizon, tolerance)
         known = load_rig(rig)
         recordings = read_all(known, place, say)
@@ -117,7 +117,7 @@ def design(
         from workbench.errors import listed
         from workbench.rig import load_rig
 
-        writable(output, json)
+        writable(output, json, reads=[rig, spec])
         known = load_rig(rig)
         asked = read_specification(spec, known) if spec else None
         numbers = design_numbers(asked, controller, known.plant) if asked else {}

@@ -52,9 +52,9 @@ def estimate(
         from studies.text_of_estimates import estimates_document, estimates_text
         from workbench.rig import load_rig
 
-        writable(json, folders=[figures])
+        writable(json, folders=[figures], reads=[rig, *recordings])
         known = load_rig(rig)
-        names = [name.strip() for name in with_.split(",")] if with_ else USUAL
+        names = [name.strip() for name in with_.split(",")] if with_ is not None else USUAL
         read = read_all(known, recordings, say)
         found = estimate_rig(known, read, names, hide or "", say)
         write_json(json, estimates_document(known.name, found))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import tempfile
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -12,8 +13,15 @@ if TYPE_CHECKING:
     from workbench.recording import Recording
 
 
-def writable(*files: Path | None, folders: Iterable[Path | None] = ()) -> None:
+def writable(
+    *files: Path | None,
+    folders: Iterable[Path | None] = (),
+    reads: Iterable[Path | None] = (),
+) -> None:
     """Refuse, before any work, a file or a folder that could not be written in the end.
+
+    ``reads`` are the files that the command reads and that are not to be written over: a slip of
+    the hand must not cost a recording.
 
     Raises
     ------
@@ -22,9 +30,12 @@ def writable(*files: Path | None, folders: Iterable[Path | None] = ()) -> None:
     """
     from workbench.errors import InputError, Message
 
-    wrong = []
+    wrong, read = [], [*filter(None, reads)]
     for path in filter(None, files):
-        if path.is_dir():
+        if any(_same(path, other) for other in read):
+            what = "is a file that this command reads"
+            wrong.append(Message(what, str(path), "the name of another file to write"))
+        elif path.is_dir():
             wrong.append(Message("is a folder", str(path), "the name of a file to write"))
         else:
             wrong += _no_folder(path, path.parent)
@@ -32,6 +43,14 @@ def writable(*files: Path | None, folders: Iterable[Path | None] = ()) -> None:
         wrong += _no_folder(path, path)
     if wrong:
         raise InputError(*wrong)
+
+
+def _same(path: Path, other: Path) -> bool:
+    """Whether two names stand for one file that is there, by a link too."""
+    try:
+        return path.samefile(other)
+    except OSError:
+        return False
 
 
 def _no_folder(path: Path, folder: Path) -> list[Any]:
@@ -44,6 +63,10 @@ def _no_folder(path: Path, folder: Path) -> list[Any]:
         return [Message(what, str(path), "a folder to write into")]
     if not os.access(nearest, os.W_OK | os.X_OK):
         return [Message(f"cannot be written: {nearest} is read-only", str(path))]
+    try:  # some folders allow it and take no file all the same, such as /proc
+        tempfile.TemporaryFile(dir=nearest).close()
+    except OSError as error:
+        return [Message(f"cannot be written: {nearest}: {error.strerror}", str(path))]
     return []
 
 

@@ -17,7 +17,7 @@ from studies.command_line.application import (
 )
 from studies.command_line.files import read_all, writable, write_json
 
-IDENTIFY = "workbench identify friction drive.toml run_*.csv -o drive2.toml --figures figures"
+IDENTIFY = "workbench identify friction drive4.toml run_*.csv stick_*.csv -o drive5.toml"
 
 
 @app.command(cls=Spread, epilog=example(IDENTIFY))
@@ -72,7 +72,8 @@ def identify(
             raise InputError(Message("needs recordings", procedure, chosen.manoeuvre))
         if into and not output:
             raise InputError(Message("writes nothing without -o", "--into", "-o FILE"))
-        writable(output, json, folders=[figures])
+        writable(output, folders=[figures], reads=recordings)
+        writable(json, reads=[rig, into, *recordings])
         known, other = load_rig(rig), load_rig(into) if into else None
         read = read_all(known, recordings, say)
         say(f"identifying {chosen.gives}")

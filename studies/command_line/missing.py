@@ -51,7 +51,7 @@ def diagnose(
         from workbench.diagnosis.diagnose import diagnose as find_missing
         from workbench.rig import load_rig
 
-        writable(json, folders=[figures])
+        writable(json, folders=[figures], reads=[rig, *train, *(validate or ())])
         known = load_rig(rig)
         read = read_to_fit(known, train, say)
         held_out = read_all(known, validate, say)
@@ -98,7 +98,7 @@ def add(
         from workbench.rig import load_rig
         from workbench.rig_writing import write_rig
 
-        writable(output)
+        writable(output, reads=[*fit, *(validate or ())])
         known = load_rig(rig)
         whole_law = effect == LAW and at is None
         name = "" if whole_law else candidate_name(known.plant, effect, at)
@@ -142,7 +142,8 @@ def improve(
         from workbench.rig import load_rig
         from workbench.rig_writing import write_rig
 
-        writable(output, json, folders=[report])
+        writable(output, folders=[report], reads=[*train, *(validate or ())])
+        writable(json, reads=[rig, *train, *(validate or ())])
         known = load_rig(rig)
         read, held_out = read_to_fit(known, train, say), read_all(known, validate, say)
         found = improve_rig(known, read, held_out, say, law)
@@ -179,7 +180,7 @@ def fit(
         from workbench.rig import load_rig
         from workbench.rig_writing import write_rig
 
-        writable(output)
+        writable(output, reads=[*train, *(validate or ())])
         known = load_rig(rig)
         names = full_names(known.plant, only or ())
         read, held_out = read_to_fit(known, train, say, names), read_all(known, validate, say)

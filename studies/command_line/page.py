@@ -6,7 +6,8 @@ from typing import Annotated
 
 import typer
 
-from studies.command_line.application import Spread, answering, app, example
+from studies.command_line.application import Quiet, Spread, answering, app, example
+from studies.command_line.files import read_all
 
 
 @app.command(cls=Spread, name="app", epilog=example("workbench app rig.toml train.csv"))
@@ -20,15 +21,20 @@ def serve_page(
     port: Annotated[
         int | None, typer.Option("--port", metavar="N", min=1, max=65535, help="Usually 5006.")
     ] = None,
+    quiet: Quiet = False,
 ) -> None:
     """The same loop as a local page: this machine alone, an address with a token of its own."""
-    with answering(quiet=True):
+    with answering(quiet) as say:
         from studies.page.jobs import begin
         from workbench.errors import InputError, Message
 
         if not find_spec("bokeh"):
             what = "the page needs the package bokeh, which is not installed"
             raise InputError(Message(what, expected="`pip install 'workbench[page]'`"))
+        if rig:
+            from workbench.rig import load_rig
+
+            read_all(load_rig(rig), recordings, say)  # what is wrong is told here, not in a tab
         begin()  # beside the imports of the server
         from studies.page.server import serve
 

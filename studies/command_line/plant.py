@@ -40,7 +40,7 @@ def simulate(
         from workbench.reading.writer import write_recording
         from workbench.rig import load_rig
 
-        writable(output)
+        writable(output, reads=[rig, inputs])
         found = load_rig(rig)
         recording = read_inputs(found, inputs)
         say(f"simulating {len(recording)} samples of {recording.name}")
@@ -72,7 +72,7 @@ def compare(
         from workbench.comparison import compare
         from workbench.rig import load_rig
 
-        writable(json, folders=[figures])
+        writable(json, folders=[figures], reads=[rig, *recordings])
         found = load_rig(rig)
         read = read_all(found, recordings, say)
         say("comparing: one step, windows, free run")

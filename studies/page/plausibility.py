@@ -19,11 +19,11 @@ from workbench.consistency.findings import Weight
 from workbench.fitting.identifiability import identifiability
 from workbench.reading.grid import LONGEST_STEP
 from workbench.reading.matlab import matlab_table
-from workbench.reading.plausible import stuck_stretch
 from workbench.reading.table import Table
 from workbench.reading.text_table import text_table
 from workbench.recording import Recording
 from workbench.rig import Rig
+from workbench.saturation import saturated
 from workbench.units import public_name, scale
 
 UNEVEN = 0.1  # of a sample: more jitter than this is worth a look
@@ -94,11 +94,11 @@ def _sensors(rig: Rig, recording: Recording) -> Iterator[Finding]:
     clipped = []
     for name in rig.fit_for(recording).measured:
         values = recording[name]
-        seen = values[np.isfinite(values)]
-        if not len(seen):
+        seen = np.isfinite(values)
+        if not seen.any():
             continue
-        share = max(float(np.mean(seen == seen.min())), float(np.mean(seen == seen.max())))
-        if share > CLIPPED and stuck_stretch(values):
+        share = float(saturated(name, values).sum() / seen.sum())
+        if share > CLIPPED:
             clipped.append(f"{public_name(name)} {percent(share)} of the time at its end")
     if clipped:
         yield Finding("clipping", "; ".join(clipped), Mark.LOOK)

@@ -217,7 +217,7 @@ def save(session: Session, path: str) -> Session:
 
     require_rig(session)
     target = Path(named(path.strip(), "rig file", "better.toml"))
-    writable(target)
+    writable(target, reads=map(Path, paths([each.opened for each in session.files])))
     write_rig(session.now.rig, target)
     load_rig(target)  # what was written reads back
     before = session.now.rig_file

@@ -12,7 +12,7 @@ resolution is coarser than the noise, a still output hardly changes at all.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from math import comb
 
@@ -20,6 +20,7 @@ import numpy as np
 
 from workbench.fitting.noise import BLOCK, NoNoiseError, measured_noise
 from workbench.recording import Recording
+from workbench.saturation import saturated
 from workbench.units import public_name
 
 STILL_SPREAD = 2.0  # spread of a still block, in noise deviations
@@ -98,9 +99,11 @@ def _source(recording: Recording, name: str, noise: float) -> NoiseSource:
 
 
 def _blocks(recording: Recording, name: str) -> np.ndarray:
-    """Stretches of neighbouring samples without a hole, shape (n_blocks, BLOCK)."""
+    """Stretches of neighbouring samples without a hole or saturation, shape (n_blocks, BLOCK)."""
     found = []
-    for piece in recording.pieces:
+    at_ends = saturated(name, recording[name])
+    kept = np.where(at_ends, np.nan, recording[name])
+    for piece in replace(recording, channels={name: kept}).pieces:
         count = len(piece) // BLOCK
         cut = piece[name][: count * BLOCK].reshape(count, BLOCK)
         found.append(cut[np.isfinite(cut).all(axis=1)])

@@ -4,6 +4,7 @@ Noise      A signal with any motion in it is smoother than white noise: the thir
            white noise have 20 times its variance, those of a motion next to none.
 Stuck      Equal to the last bit for a while, in a channel that otherwise changes from sample to
            sample, while the plant says that it moves.
+Saturated  At an end of what it can show, to the last bit, again and again.
 Stops      No body gets through them.
 Clock      A sample taken delta late reads y + delta dy/dt: noise that grows with the slope, by the
            same delta in every channel that is fine enough to show it.
@@ -21,8 +22,9 @@ from workbench.effects.forces import EndStops
 from workbench.fitting.noise import THIRD_DIFFERENCE_GAIN, NoNoiseError, measured_noise
 from workbench.fitting.window_cuts import evenly
 from workbench.plant import Plant
-from workbench.reading.plausible import stuck_stretch
+from workbench.reading.plausible import saturation_text, stuck_stretch
 from workbench.recording import Recording
+from workbench.saturation import saturated
 from workbench.units import display_unit, public_name, scale
 
 WHITE = 0.8  # of a channel's standard deviation is that of white noise
@@ -95,8 +97,9 @@ def beyond_stops(plant: Plant, recording: Recording) -> list[Finding]:
 
 
 def stuck(plant: Plant, recording: Recording) -> tuple[Recording, list[Finding]]:
-    """The recording without the samples of outputs that are stuck, and the findings."""
-    found, channels = [], dict(recording.channels)
+    """The recording without the samples of outputs that stick or saturate, and the findings."""
+    recording, found = _without_saturated(plant, recording)
+    channels = dict(recording.channels)
     for name in plant.measured:
         stretch = stuck_stretch(recording[name])
         if stretch is None or not _should_move(plant, recording, name, stretch):
@@ -114,6 +117,19 @@ def stuck(plant: Plant, recording: Recording) -> tuple[Recording, list[Finding]]
         remedy = "these samples are left out; check the sensor"
         found.append(_finding(Weight.DOUBT, recording, name, what, remedy))
     return replace(recording, channels=channels), found
+
+
+def _without_saturated(plant: Plant, recording: Recording) -> tuple[Recording, list[Finding]]:
+    found, channels = [], dict(recording.channels)
+    for name in plant.measured:
+        values = recording[name]
+        at_ends = saturated(name, values)
+        if at_ends.any():
+            channels[name] = np.where(at_ends, np.nan, values)
+            what = saturation_text(name, values, at_ends)
+            remedy = "left out of fits and of the noise; a sensor of a wider range would tell them"
+            found.append(_finding(Weight.DOUBT, recording, name, what, remedy))
+    return replace(recording, channels=channels) if found else recording, found
 
 
 def _should_move(plant: Plant, recording: Recording, name: str, stretch: tuple[int, int]) -> bool:

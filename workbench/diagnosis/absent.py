@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from workbench.candidate import Candidate
+from workbench.errors import InputError, Message
+from workbench.plant import Plant, require
 from workbench.rig import Rig
+from workbench.units import public_name
 
 
 def is_new(rig: Rig, candidate: Candidate) -> bool:
@@ -24,3 +27,24 @@ def unknown_forms(rig: Rig, candidates: Iterable[Candidate]) -> tuple[str, ...]:
     singles = (each for candidate in candidates for each in candidate.singles)
     placed = (each for each in singles if each.strength in rig.plant.parameters)
     return tuple(name for each in placed if is_new(rig, each) for name in each.forms)
+
+
+def require_place(rig: Rig, plant: Plant, names: Iterable[str]) -> None:
+    """Refuse what the rig's plant has no place for as it is recorded, ``plant``.
+
+    Raises
+    ------
+    InputError
+        If the recordings measure what the effect would produce.
+    UnknownNameError
+        If there is no place with any recording, with the nearest name.
+    """
+    for name in names:
+        if name in rig.plant.candidates and name not in plant.candidates:
+            member = rig.plant.candidates[name].member
+            effect = next(each for each in rig.plant.members if each.name == member)
+            made = public_name(getattr(effect, "produces", ""))
+            what = f"is not applicable: {made or 'what it would produce'} is measured"
+            expected = "recordings without that channel; take it out of [recording.channels]"
+            raise InputError(Message(what, name, expected))
+    require(names, plant.candidates, plant.name)

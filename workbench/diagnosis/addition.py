@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 from workbench.candidate import TOGETHER, Candidate
 from workbench.consistency import checked
-from workbench.diagnosis.absent import is_new
+from workbench.diagnosis.absent import is_new, require_place
 from workbench.diagnosis.diagnose import Progress, silent
 from workbench.diagnosis.evidence import WARNINGS, Recordings, held_out, weighed
 from workbench.diagnosis.law import better_base, empirical_law, plant_with_terms, standing
@@ -29,7 +29,7 @@ from workbench.fitting.posterior import (
 )
 from workbench.fitting.problem import Problem, pose
 from workbench.law_range import ranges_text
-from workbench.plant import Plant, require
+from workbench.plant import Plant
 from workbench.recording import Recording
 from workbench.rig import Rig
 from workbench.rig_laws import is_law
@@ -67,8 +67,8 @@ def add(
 
     Raises
     ------
-    UnknownNameError
-        If the plant has no such effect for these recordings, with the nearest name.
+    InputError
+        If the plant has no such effect, with the nearest name, or the recordings measure it.
     ValueError
         If the effect is there already, only a shift of a parameter that is fitted anyway, fixed by
         the rig, or a change of something that the plant lacks; or if there are more than two.
@@ -78,7 +78,7 @@ def add(
         rig = replace(rig, plant=plant_with_terms(rig.plant, train, [name]))
     plant = rig.fit_for(train[0])
     names = _names_in(name)
-    require(names, plant.candidates, plant.name)
+    require_place(rig, plant, names)
     candidates = [plant.candidates[each] for each in names]
     progress("prior fit")
     problem = pose(rig, train, validation)

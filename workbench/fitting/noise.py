@@ -7,6 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from workbench.recording import Recording
+from workbench.saturation import saturated
 
 BLOCK = 40  # samples
 QUIET_SHARE = 0.3  # this share of the blocks is taken for still
@@ -23,8 +24,9 @@ def measured_noise(recordings: Iterable[Recording], channels: Iterable[str]) -> 
 
     Each recording is cut into blocks.  The quietest third gives a level, and all blocks that are
     alike within the chance of one block give the noise: the quietest alone would make it a tenth
-    too small.  A value given with the recording (``Recording.noise``) comes first.  The floor is
-    the quantisation, one step over sqrt(12).
+    too small.  Samples at the end of a sensor's range have no noise, and are left out.  A value
+    given with the recording (``Recording.noise``) comes first.  The floor is the quantisation, one
+    step over sqrt(12).
 
     Raises
     ------
@@ -39,7 +41,7 @@ def _noise_of(recordings: tuple[Recording, ...], channel: str) -> float:
     given = [r.noise[channel] for r in recordings if channel in r.noise]
     if given:
         return float(max(given))
-    spread = np.concatenate([_block_deviations(r[channel]) for r in recordings])
+    spread = np.concatenate([_block_deviations(channel, r[channel]) for r in recordings])
     quiet = _level(spread) if len(spread) else 0.0
     values = np.concatenate([r[channel] for r in recordings])
     noise = max(quiet, _step(values) / np.sqrt(12.0))
@@ -50,13 +52,18 @@ def _noise_of(recordings: tuple[Recording, ...], channel: str) -> float:
     )
 
 
-def _block_deviations(values: np.ndarray) -> np.ndarray:
-    """Noise of each block from third differences, which no parabola enters, shape (n_blocks,)."""
-    values = values[np.isfinite(values)]
-    count = (len(values) - 3) // BLOCK
+def _block_deviations(channel: str, values: np.ndarray) -> np.ndarray:
+    """Noise of each block from third differences, which no parabola enters, shape (n_blocks,).
+
+    No difference reaches over a saturated sample: its neighbours are far apart.
+    """
+    kept = np.where(saturated(channel, values), np.nan, values)
+    differences = np.diff(kept[np.isfinite(values)], 3)
+    differences = differences[np.isfinite(differences)]
+    count = len(differences) // BLOCK
     if count < 1:
         return np.array([])
-    differences = np.diff(values, 3)[: count * BLOCK].reshape(count, BLOCK)
+    differences = differences[: count * BLOCK].reshape(count, BLOCK)
     return np.sqrt(np.mean(differences**2, axis=1) / THIRD_DIFFERENCE_GAIN)
 
 

@@ -199,7 +199,7 @@ PROCEDURE = Procedure(
     "open for 30 s; one recording for each chamber",
     channels="valve.command, slide.position, the pressure of the chamber, and that of the tank as "
     "supply.pressure, at 50 Hz or more",
-    example="dead-volume drive.toml release_a.csv release_b.csv --tank '0.344 l' -o drive2.toml",
+    example="dead-volume drive2.toml release_*.csv --tank '0.344 l' -o drive3.toml",
     source="paper 002 Eqs. 22, 23, Fig. 15, Table 6 (S002-7, E002-9)",
     printed={"chamber_a.total_volume_m3": 1.734e-4, "chamber_b.total_volume_m3": 1.976e-4},
     run=dead_volume,

@@ -284,7 +284,7 @@ PROCEDURE = Procedure(
     manoeuvre="one constant command per recording, both directions: several that slide at constant "
     "speed over the stroke, and some just outside the dead zone that stick and slip",
     channels="valve.command, slide.position and both pressures at 500 Hz or more",
-    example="friction drive3.toml run_*.csv stick_*.csv -o drive4.toml --figures figures",
+    example="friction drive4.toml run_*.csv stick_*.csv -o drive5.toml --figures figures",
     source="paper 002 Figs. 13, 14, Table 5 (S002-4, S002-5, S002-6)",
     printed={
         "static_forward_n": 50.97,

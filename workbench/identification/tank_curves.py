@@ -242,7 +242,7 @@ PROCEDURE = Procedure(
     channels="valve.command and reservoir.pressure at 500 Hz or more; supply.pressure where the "
     "supply is not constant",
     first="dead-zone",
-    example="flow tank2.toml curve_*.csv -o tank3.toml --figures figures",
+    example="flow tank2.toml curve_*.csv -o drive2.toml --into drive.toml --figures figures",
     source="paper 002 4.1, Figs. 7 to 10 (S002-1)",
     printed={"mean_error_pa": TYPICAL_ERROR_PA},
     run=tank_curves,

@@ -251,7 +251,7 @@ PROCEDURE = Procedure(
     "that of the first",
     channels="valve.command, slide.position and the pressure of the chamber at 500 Hz or more",
     first="dead-volume",
-    example="wall-heat drive2.toml push_1.csv push_2.csv -o drive3.toml --figures figures",
+    example="wall-heat drive3.toml push.csv -o drive4.toml --figures figures",
     source="paper 002 Eqs. 16 to 19, Fig. 12, Table 4 (S002-3)",
     printed={
         "time_constant_s": 0.662,

@@ -14,6 +14,8 @@ from workbench.reading.table import RecordingWarning
 
 LONGEST_STEP = 2.5  # of the usual time between samples; beyond that it is a gap
 EXACT = 0.02  # of a sample: closer to the grid than this needs no interpolation
+ROUNDING = 0.05  # of half a resolution: the line through rounded stamps is not quite the clock's
+FEWEST = 20  # stamps that tell a line
 CLOCK = 0.6  # of a sample: a clock this close to even ticks evenly, its stamps are rounded
 
 
@@ -123,7 +125,30 @@ def _step(
     even = (t[-1] - t[0]) / max(len(t) - 1, 1) or usual
     off = np.abs(t - t[0] - even * np.arange(len(t))).max() / even
     step = resample_s or _tidy(even if off < CLOCK else usual, len(t))
-    return step, all(_fits(time_s[piece], step) for piece in pieces)
+    exact = all(_fits(time_s[piece], step) for piece in pieces)
+    if exact or resample_s or len(t) < FEWEST:
+        return step, exact
+    slope = float(np.polyfit(np.arange(len(t)), t - t[0], 1)[0])  # less moved by rounding than ends
+    only_rounded = all(_only_rounded(time_s[piece], slope) for piece in pieces)
+    return (_tidy(slope, len(t)), True) if only_rounded else (step, False)
+
+
+def _only_rounded(t: np.ndarray, step: float) -> bool:
+    """Whether an even clock was stamped with a coarser one: then the samples are even as they are.
+
+    All stamps are multiples of a resolution, and within half of it of an even grid.
+    """
+    late = t - step * np.arange(len(t))
+    half = 0.5 * float(np.ptp(late))
+    return half <= CLOCK * step and half <= (1.0 + ROUNDING) * 0.5 * _resolution(t)
+
+
+def _resolution(t: np.ndarray) -> float:
+    """The largest of 1, 2, 5 times a power of ten of which all stamps are multiples, else 0."""
+    for size in (lead * 10.0**power for power in range(0, -10, -1) for lead in (5.0, 2.0, 1.0)):
+        if np.abs(t / size - np.round(t / size)).max() < 1e-4:
+            return size
+    return 0.0
 
 
 def _fits(t: np.ndarray, step: float) -> bool:

@@ -13,6 +13,7 @@ from workbench.plant import Plant
 from workbench.reading.table import RecordingWarning
 from workbench.recording import Recording
 from workbench.rig import AMBIENT, Rig
+from workbench.saturation import LIVELY, saturated
 from workbench.units import display_unit, public_name, scale, si_unit, suffix
 
 LIMITS = {
@@ -40,7 +41,6 @@ SUPPLY = "supply.pressure_pa"
 ROOM = 0.25  # a chamber goes that far below ambient and above supply, as shares of each
 BEYOND = 1.5  # of the range of a command: more cannot be that command
 RUN = 50  # equal values in a row that make a sensor suspect, where it usually changes
-LIVELY = 0.2  # share of unchanged samples below which a channel usually changes
 
 
 def cannot_be(
@@ -51,6 +51,8 @@ def cannot_be(
     size, kind = max(abs(low), abs(high)), public_name(name)
     least, most = LIMITS.get(suffix(name), (0.0, np.inf))
     for signal in plant.commands:
+        if signal.name == name and signal.levels:
+            return _no_level(kind, raw, si, signal.levels, file)
         if signal.name == name and np.isfinite(signal.upper):
             most = BEYOND * max(abs(signal.upper), abs(signal.lower))
     if unit.endswith("_gauge"):
@@ -69,6 +71,19 @@ def cannot_be(
         what = f"an absolute pressure of {low / 1e5:.3g} bar cannot be"
         return Message(what, kind, f"'{unit}_gauge' if it counts from ambient", file=file)
     return None
+
+
+def _no_level(
+    kind: str, raw: np.ndarray, si: np.ndarray, levels: Sequence[float], file: str
+) -> Message | None:
+    """What a switched command cannot be: anything between or beyond its levels."""
+    off = np.isfinite(si) & ~np.isclose(si[:, None], levels, atol=1e-6).any(axis=1)
+    if not off.any():
+        return None
+    first = int(off.argmax())
+    what = f"is {raw[first]:.4g} in sample {first + 1}"
+    more = f", and none of its levels in {off.sum()} samples" if off.sum() > 1 else ""
+    return Message(what + more, kind, " or ".join(f"{level:g}" for level in levels), file=file)
 
 
 def _ten_times(name: str, si: np.ndarray, unit: str, plant: Plant) -> str:
@@ -104,18 +119,31 @@ def warn_of_sensors(channels: Mapping[str, np.ndarray], outputs: set[str], file:
     """Warn of sensors that stand still, or sit at the end of their range, for a while."""
     for name in outputs & channels.keys():
         values = channels[name]
-        stretch = stuck_stretch(values)
-        if stretch is None:
-            continue
-        first, length = stretch
-        at_end = values[first] in (np.nanmin(values), np.nanmax(values))
-        shown = scale(display_unit(name), name).from_si(values[first])
-        warnings.warn(
-            f"{file}: {public_name(name)}: {'saturated' if at_end else 'stuck'} at "
-            f"{shown:.5g} {display_unit(name)} for {length} samples from sample {first + 1} on",
-            RecordingWarning,
-            stacklevel=3,
-        )
+        at_ends = saturated(name, values)
+        said = [saturation_text(name, values, at_ends)] if at_ends.any() else []
+        stretch = stuck_stretch(np.where(at_ends, np.nan, values))
+        if stretch is not None:
+            first, length = stretch
+            at_end = values[first] in (np.nanmin(values), np.nanmax(values))
+            said += [
+                f"{'saturated' if at_end else 'stuck'} at {_shown(name, values[first])} for "
+                f"{length} samples from sample {first + 1} on"
+            ]
+        for each in said:
+            text = f"{file}: {public_name(name)}: {each}"
+            warnings.warn(text, RecordingWarning, stacklevel=3)
+
+
+def saturation_text(name: str, values: np.ndarray, at_ends: np.ndarray) -> str:
+    """At which values a sensor is saturated, and in which share of the samples."""
+    ends = " and ".join(_shown(name, end) for end in np.unique(values[at_ends]))
+    count, seen = int(at_ends.sum()), int(np.isfinite(values).sum())
+    first = int(at_ends.argmax()) + 1
+    return f"saturated at {ends} in {count} samples ({count / seen:.1%}) from sample {first} on"
+
+
+def _shown(name: str, value: float) -> str:
+    return f"{scale(display_unit(name), name).from_si(value):.5g} {display_unit(name)}".rstrip()
 
 
 def stuck_stretch(values: np.ndarray) -> tuple[int, int] | None:

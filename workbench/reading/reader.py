@@ -16,6 +16,7 @@ from workbench.reading.matlab import matlab_table
 from workbench.reading.plausible import cannot_be, warn_of_sensors
 from workbench.reading.table import RecordingWarning, Table
 from workbench.reading.text_table import text_table
+from workbench.reading.time_unit import warn_of_time_unit
 from workbench.recording import Recording
 from workbench.recording_format import derived_channels
 from workbench.rig import Rig
@@ -51,6 +52,8 @@ def read_recording(rig: Rig, path: Path | str) -> Recording:
         resample_s=rig.reader.resample_s,
         least=WINDOW if derived else 2,
     )
+    if "time" in columns:
+        warn_of_time_unit(raw[columns["time"]], rig.reader.time.unit, table.file)
     channels = {name: grid.on(values) for name, values in channels.items()}
     for velocity, position in derived.items():
         channels[velocity] = derivative(channels[position], grid.sample_time_s, grid.starts)
@@ -107,9 +110,21 @@ def _columns(rig: Rig, table: Table) -> dict[str, int]:
             found["time"] = number
         else:
             wrong.insert(0, number)
+    wrong += _shared(table, found)
     if wrong:
         raise InputError(*wrong)
     return found
+
+
+def _shared(table: Table, columns: dict[str, int]) -> list[Message]:
+    """Columns that the rig reads as two signals, one by its name and one by its number."""
+    wrong, first = [], {}
+    for name, number in columns.items():
+        other = first.setdefault(number, name)
+        if other != name:
+            what = f"column {number + 1} is that of {public_name(other)} already"
+            wrong.append(Message(what, public_name(name), "a column of its own", file=table.file))
+    return wrong
 
 
 def _require_units(rig: Rig, table: Table, columns: dict[str, int]) -> None:

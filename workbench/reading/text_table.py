@@ -23,6 +23,9 @@ NUMBER = re.compile(r"[-+]?(?:[\d.]*\d[\d.]*(?:e[-+]?\d+)?|nan|inf)", re.IGNOREC
 COMMA_NUMBER = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?|[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
 MISSING = {"", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--"}
 LOOKED_AT = 50  # lines that decide on separator and decimal sign
+BINARY = re.compile(r"[\x00-\x08\x0e-\x19\x1b-\x1f\x7f]")  # control characters of no text
+BINARY_SHARE = 0.05  # of them in the first lines; a text has a spoiled cell at the most
+SHOWN = 30  # characters of a cell in a message
 
 
 def text_table(path: Path, reader: RecordingFormat) -> Table:
@@ -34,7 +37,7 @@ def text_table(path: Path, reader: RecordingFormat) -> Table:
         If it holds no rows of numbers, or numbers where names were expected.
     """
     file, lines = str(path), decoded(open_bytes(path)).splitlines()
-    if "\0" in "".join(lines[:3]):
+    if _binary(lines):
         raise InputError(Message("is no text", expected="a CSV or MAT file", file=file))
     rows = [
         (number, line)
@@ -117,6 +120,13 @@ def plain_numbers(lines: list[str], separator: str, reader: RecordingFormat) -> 
     return text.split("\n")
 
 
+def _binary(lines: Sequence[str]) -> bool:
+    """Whether these are no lines of a text: the first of a text have no control characters."""
+    sample = "\n".join(lines[:LOOKED_AT])
+    many = len(BINARY.findall(sample)) > BINARY_SHARE * len(sample)
+    return many or BINARY.search("\n".join(lines[:3])) is not None
+
+
 def _numeric(text: str) -> bool:
     """True when the first cell of a row is a number."""
     first = re.split(r"[;,\t| ]+", text.strip().strip('"'))[0]
@@ -168,6 +178,6 @@ def _cell_by_cell(
             try:
                 found[i, row] = float(cells[column])
             except ValueError:
-                what = f"'{cells[column]}' in column {column + 1} is not a number"
+                what = f"{cells[column][:SHOWN]!r} in column {column + 1} is not a number"
                 raise InputError(Message(what, file=file, line=place)) from None
     return found
