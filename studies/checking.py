@@ -27,6 +27,7 @@ from studies.following_check import FollowingCheck, check_followed, tasks_of
 from studies.sample_times import require_multiple
 from studies.scenarios import SCENARIOS
 from studies.shift_check import SHIFTS, ShiftCheck, check_shifts, valves_off
+from studies.specification import Asked, Limit
 from studies.text import shown
 from workbench.contracts import Controller
 from workbench.errors import InputError, Message, listed
@@ -58,12 +59,15 @@ class Loops:
         By name; none for a plant that shifts, whose filter is its own.
     scenarios
         Of the plant, by name.
+    asked
+        Lines of a specification; time outside its limits counts on a slide, whose rows tell of it.
     """
 
     rig: Rig
     controllers: Mapping[str, Controller]
     estimators: tuple[str, ...]
     scenarios: tuple[str, ...]
+    asked: tuple[Asked, ...] = ()
 
     def once(self, plant: Plant, seed: int) -> Checked:
         """Every controller with every estimator in every scenario on this plant.
@@ -83,10 +87,11 @@ class Loops:
                 seed=seed,
                 strength=valves_off(self.rig),
             )
-        closed = check_followed if name in BENCHES else check
-        return closed(
-            plant, self.controllers, self.estimators, self.scenarios, believed=believed, seed=seed
-        )
+        every = plant, self.controllers, self.estimators, self.scenarios
+        if name in BENCHES:
+            return check_followed(*every, believed=believed, seed=seed)
+        limits = [line for line in self.asked if isinstance(line, Limit)]
+        return check(*every, believed=believed, seed=seed, limits=limits)
 
     @property
     def apart(self) -> tuple[Loops, ...]:

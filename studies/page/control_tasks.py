@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from controllers.design_file import design, write_design
@@ -125,5 +125,5 @@ def close_loops(
     told, path = tuple(design_texts(design_report(found, say))), Path(target)
     write_design(found, path)
     loops = loops_of(rig, {path: path.read_text(encoding="utf-8")}, estimators, scenarios)
-    checked = recorded_runs(loops, runs, say)
+    checked = recorded_runs(replace(loops, asked=asked.asked if asked else ()), runs, say)
     return Looped(told, checked, drawings(styled_figures(checked)))
