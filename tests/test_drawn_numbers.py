@@ -9,7 +9,7 @@ import pytest
 from studies.figures.comparison import overlay_figure
 from studies.figures.estimates import band_figure
 from studies.figures.residuals import residual_figure
-from studies.figures.robustness import spread_figure
+from studies.figures.robustness import influence_figure, spread_figure
 from studies.figures.style import new_figure, save, styled
 from studies.robustness import Line, Robustness
 from workbench.comparison.compare import compare
@@ -26,7 +26,7 @@ def table(figure, folder):
     with (folder / "one.csv").open(newline="") as file:
         for row in csv.DictReader(file):
             curves = found.setdefault(row["panel"], {})
-            curves.setdefault(row["curve"], []).append((float(row["x"]), row["y"]))
+            curves.setdefault(row["curve"], []).append((row["x"], row["y"]))
     return found
 
 
@@ -92,6 +92,16 @@ def test_a_spread_is_named_by_its_line_and_so_are_its_curves(tmp_path):
     assert list(found) == ["rise_time, step (ms)", "air, step (ms)"]
     for curves in found.values():
         assert list(curves) == ["share up to it", "missed", "asked for"]
+
+
+def test_the_cells_of_a_map_of_influences_are_in_the_table(tmp_path):
+    mass = np.linspace(-2.0, 2.0, 50)
+    lines = [Line(name, "at most 1", size, size > 1.0) for name, size in
+             (("rise", mass), ("error", mass**2), ("air", -mass))]  # fmt: skip
+    found = table(influence_figure(Robustness((*lines,), {"slide.mass_kg": mass})), tmp_path)
+
+    (cells,) = (each for name, each in found.items() if not name.startswith("scale"))
+    assert cells == {"1": [("rise", "slide.mass")], "-1": [("air", "slide.mass")]}
 
 
 def test_what_nobody_named_is_told_apart_all_the_same(tmp_path):

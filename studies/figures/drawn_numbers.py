@@ -20,8 +20,10 @@ import numpy as np
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.collections import QuadMesh
     from matplotlib.figure import Figure
+    from matplotlib.image import AxesImage
 
 UNNAMED = re.compile(r"_(child\d+|container\d+|nolegend_)?$")  # by Matplotlib, or by nobody
 SCALE = "<colorbar>"
@@ -158,6 +160,8 @@ def _curves(axes: Axes) -> Iterator[tuple[str, list, list]]:
     for mesh in axes.collections:
         if hasattr(mesh, "get_coordinates"):
             yield from _cells(mesh)
+    for image in axes.images:
+        yield from _image_cells(axes, image)
     for cloud in axes.collections:
         if hasattr(cloud, "get_coordinates"):
             continue
@@ -168,10 +172,7 @@ def _curves(axes: Axes) -> Iterator[tuple[str, list, list]]:
         if not hasattr(bars, "patches"):
             continue
         flat = getattr(bars, "orientation", "vertical") == "horizontal"
-        axis = axes.yaxis if flat else axes.xaxis
-        ticks = axis.get_ticklocs()
-        labels = axis.get_major_formatter().format_ticks(ticks)  # also where a panel hides them
-        words = {round(float(at), 6): label for at, label in zip(ticks, labels, strict=True)}
+        words = _words(axes.yaxis if flat else axes.xaxis)
         sizes = [p.get_width() if flat else p.get_height() for p in bars.patches]
         middles = [
             p.get_y() + p.get_height() / 2 if flat else p.get_x() + p.get_width() / 2
@@ -188,6 +189,27 @@ def _cells(mesh: QuadMesh) -> Iterator[tuple[str, list, list]]:
     for row, column in zip(*np.nonzero(~np.ma.getmaskarray(values)), strict=True):
         x, y = middles[row, column]
         yield f"{values[row, column]:.6g}", [x], [y]
+
+
+def _image_cells(axes: Axes, image: AxesImage) -> Iterator[tuple[str, list, list]]:
+    """Value of each cell that is shown, and the words at its ticks, or its middle without any."""
+    values, (left, right, bottom, top) = np.ma.masked_invalid(image.get_array()), image.get_extent()
+    if image.origin == "lower":
+        bottom, top = top, bottom
+    over, beside = _words(axes.xaxis), _words(axes.yaxis)
+    rows, columns = values.shape[:2]
+    for row, column in zip(*np.nonzero(~np.ma.getmaskarray(values)), strict=True):
+        x = left + (column + 0.5) * (right - left) / columns
+        y = top + (row + 0.5) * (bottom - top) / rows
+        shown = [over.get(round(x, 6), x)], [beside.get(round(y, 6), y)]
+        yield f"{values[row, column]:.6g}", *shown
+
+
+def _words(axis: Axis) -> dict[float, str]:
+    """The labels of an axis by where they stand, also where a panel hides them."""
+    ticks = axis.get_ticklocs()
+    labels = axis.get_major_formatter().format_ticks(ticks)
+    return {round(float(at), 6): label for at, label in zip(ticks, labels, strict=True)}
 
 
 def _short(value: object) -> str:
