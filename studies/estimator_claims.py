@@ -73,7 +73,7 @@ def _of_runs(values: np.ndarray, moving: np.ndarray, exact: float) -> tuple[floa
     means = np.array([row[there].mean() for row, there in pairs if there.any()])
     n = len(means)
     half = nan if n < 2 else student.ppf(0.5 + BAND / 2.0, n - 1) * means.std(ddof=1) / sqrt(n)
-    return float(means.mean()), float(exact - half), float(exact + half)
+    return float(means.mean()), float(max(exact - half, 0.0)), float(exact + half)
 
 
 def velocity_claims(found: Mapping[str, Mapping[str, float]]) -> Iterator[Claim]:
