@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -93,9 +94,20 @@ def state_limits(plant: Plant, spec: MpcSpec, method: str = "mpc") -> np.ndarray
     lowest_m, below_m = (max(spec.margin_m, each) for each in (spec.lowest_m, spec.below_end_m))
     low = [lowest_m, -spec.fastest_m_s, spec.lowest_pa, spec.lowest_pa]
     high = [stroke_m(plant) - below_m, spec.fastest_m_s, highest_pa, highest_pa]
-    if not np.less(low, high).all():
-        names = "margin_m", "lowest_pa", "below_supply_pa", "lowest_m", "below_end_m"
-        what = listed([f"{name} {getattr(spec, name):g}" for name in names])
-        expected = "less than the stroke and the supply pressure between them"
-        raise InputError(Message(f"{what} leave no room on {plant.name}", method, expected))
+    if wrong := [*_without_room(spec, plant, method, np.less(low, high))]:
+        raise InputError(*wrong)
     return np.array([low, high])
+
+
+def _without_room(spec: MpcSpec, plant: Plant, method: str, roomy: np.ndarray) -> Iterator[Message]:
+    """The numbers between which nothing is left, of the states that are not ``roomy``, (4,)."""
+    position, _, *pressures = roomy
+    kept = (
+        (position, ("margin_m", "lowest_m", "below_end_m"), "the stroke"),
+        (all(pressures), ("lowest_pa", "below_supply_pa"), "the supply pressure"),
+    )
+    for room, names, whole in kept:
+        if not room:
+            what = listed([f"{name} {getattr(spec, name):g}" for name in names])
+            expected = f"less than {whole} between them"
+            yield Message(f"{what} leave no room on {plant.name}", method, expected)

@@ -11,6 +11,9 @@ Plans, none of which switches sooner than a valve may, are commands ahead, shape
   switches per valve: far from a poor plan its modes tell nothing of a good one, and a brake that
   comes too early leaves the piston half-way.
 
+Where few are judged, the last plan, no switch and the suggestion are always among them; what is cut
+short are the other plans of a sample ago and the moved ones.
+
 The nonlinear model judges each, so a plan is only changed for one that this prefers.
 """
 
@@ -68,7 +71,7 @@ class PlanSearch:
         ``suggested`` one more, shape (2, N).  ``turn`` counts the samples of a shift.
         """
         others = before[1:][self.keep(sent, before[1:])]
-        known = [before[:1], others, self.held(sent)[None], suggested[None]]
+        known = [before[:1], self.held(sent)[None], suggested[None], others]
         near = np.concatenate([*known, moved(self.responses, sent, before[0])])
         near = near[: self.judged + 1 - RANKED]
         left = self.judged + 1 - len(near)

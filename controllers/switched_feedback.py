@@ -4,7 +4,9 @@
 
 ``held`` are the commands that lead to the target, and the target has the pressures that they leave.
 A valve is energised where its share is above one half, no sooner than its least time after the last
-switch; or it is energised for the share of each period, in steps of the least time (PWM).
+switch; or it is energised for the share of each period, in steps of the least time (PWM).  Without
+a finite estimate the last command holds, then both are shut, as in :mod:`controllers.unseen`; what
+was sent then counts too, so that the least time is kept once the estimate is back.
 
 Source: Appl. Sci. 2020, 10(10), 3514 (PD and LQ on the modes of the actuator of paper 003, valves
 discretised).  The PD gains and the tolerances of LQ are *chosen*.
@@ -19,6 +21,7 @@ import numpy as np
 
 from controllers.lq import dlqr
 from controllers.shift_prediction import drives
+from controllers.unseen import HELD_S
 from linearize.discrete import sampled
 from linearize.modes import HybridModel
 from linearize.shift_modes import valve_flows
@@ -36,11 +39,18 @@ GAUGED = ("Low side 1 charges 2 charges", "High side 1 charges 2 charges")
 
 @dataclass(frozen=True)
 class SwitchedMemory:
-    """Commands sent as integers, newest lowest; sample within the period, and shares of it."""
+    """What was done so far.
+
+    sent        commands as integers, newest lowest
+    phase       sample within the period
+    shares      of the period
+    unseen      samples since the last finite estimate
+    """
 
     sent: tuple[int, int] = (0, 0)
     phase: int = 0
     shares: tuple[float, float] = (0.0, 0.0)
+    unseen: int = 0
 
 
 @dataclass(frozen=True)
@@ -63,6 +73,8 @@ class SwitchedFeedback:
 
     def step(self, last: Command, reference: np.ndarray, estimate: Estimate) -> Command:
         x, memory = estimate.pick(STATES), last.memory
+        if not np.isfinite(x).all():
+            return self._blind(memory)
         place_m = min(self.targets, key=lambda m: abs(m - reference[0, 0]))
         wanted, held = self.targets[place_m]
         shares = held - self.gains[int(x[2] > 0.0)] @ (x - wanted)
@@ -73,14 +85,24 @@ class SwitchedFeedback:
             steps = self.period / HOLD
             shares = np.round(np.clip(shares, 0.0, 1.0) * steps) / steps
             level = memory.phase / self.period
-        on = [
-            int(share > level) if age(s) >= HOLD else s & 1
-            for share, s in zip(shares, memory.sent, strict=True)
-        ]
-        sent = tuple((s << 1 | u) & MASK for s, u in zip(memory.sent, on, strict=True))
+        on, sent = _switched(memory.sent, [int(share > level) for share in shares])
         phase = (memory.phase + 1) % self.period if self.period else 0
-        kept = SwitchedMemory(sent, phase, tuple(map(float, shares)))
-        return Command(np.array(on, dtype=float), kept)
+        return Command(on, SwitchedMemory(sent, phase, tuple(map(float, shares))))
+
+    def _blind(self, memory: SwitchedMemory) -> Command:
+        """What is sent while nobody knows where the piston is; a period goes on afterwards."""
+        unseen = memory.unseen + 1
+        holds = unseen * self.sample_time_s <= HELD_S
+        on, sent = _switched(memory.sent, [s & 1 if holds else 0 for s in memory.sent])
+        return Command(on, replace(memory, sent=sent, unseen=unseen), {"fallback": 1.0})
+
+
+def _switched(sent: tuple[int, int], wanted: list[int]) -> tuple[np.ndarray, tuple[int, int]]:
+    """What is sent of what is wanted, (2,), no valve sooner than it may; and all that was sent."""
+    pairs = zip(sent, wanted, strict=True)
+    on = [u if age(s) >= HOLD else s & 1 for s, u in pairs]
+    first, second = ((s << 1 | u) & MASK for s, u in zip(sent, on, strict=True))
+    return np.array(on, dtype=float), (first, second)
 
 
 def switched_pd(hybrid: HybridModel) -> SwitchedFeedback:

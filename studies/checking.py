@@ -27,6 +27,7 @@ from studies.following_check import FollowingCheck, check_followed, tasks_of
 from studies.sample_times import require_multiple
 from studies.scenarios import SCENARIOS
 from studies.shift_check import SHIFTS, ShiftCheck, check_shifts, valves_off
+from studies.specification import Asked, Limit
 from studies.text import shown
 from workbench.contracts import Controller
 from workbench.errors import InputError, Message, listed
@@ -58,12 +59,15 @@ class Loops:
         By name; none for a plant that shifts, whose filter is its own.
     scenarios
         Of the plant, by name.
+    asked
+        Lines of a specification; time outside its limits counts on a slide, whose rows tell of it.
     """
 
     rig: Rig
     controllers: Mapping[str, Controller]
     estimators: tuple[str, ...]
     scenarios: tuple[str, ...]
+    asked: tuple[Asked, ...] = ()
 
     def once(self, plant: Plant, seed: int) -> Checked:
         """Every controller with every estimator in every scenario on this plant.
@@ -83,10 +87,11 @@ class Loops:
                 seed=seed,
                 strength=valves_off(self.rig),
             )
-        closed = check_followed if name in BENCHES else check
-        return closed(
-            plant, self.controllers, self.estimators, self.scenarios, believed=believed, seed=seed
-        )
+        every = plant, self.controllers, self.estimators, self.scenarios
+        if name in BENCHES:
+            return check_followed(*every, believed=believed, seed=seed)
+        limits = [line for line in self.asked if isinstance(line, Limit)]
+        return check(*every, believed=believed, seed=seed, limits=limits)
 
     @property
     def apart(self) -> tuple[Loops, ...]:
@@ -197,8 +202,12 @@ def apart(rig: Rig, plant: Plant, most: int = 3) -> str:
 
 
 def drawn(rig: Rig, rng: np.random.Generator) -> Plant:
-    """The plant with every uncertain parameter drawn anew, within its bounds."""
-    plant, values = rig.plant, {}
+    """The plant with every uncertain parameter drawn anew, within its bounds.
+
+    What belongs to an absent cause stays as it is: it changes no run, and would be told of the
+    worst one.  Its numbers are drawn all the same, so that those of the others do not move.
+    """
+    plant, values, idle = rig.plant, {}, idle_parameters(rig.plant)
     for name, value in plant.values.items():
         known, deviation = plant.parameters[name], rig.standard_deviation(name)
         absent = known.null is not None and value == known.null
@@ -206,8 +215,21 @@ def drawn(rig: Rig, rng: np.random.Generator) -> Plant:
             continue
         draws = value + deviation * rng.standard_normal(DRAWS)
         inside = draws[(draws >= known.lower) & (draws <= known.upper)]
-        values[name] = float(inside[0]) if len(inside) else value
+        if len(inside) and name not in idle:
+            values[name] = float(inside[0])
     return plant.with_values(values)
+
+
+def idle_parameters(plant: Plant) -> frozenset[str]:
+    """Parameters that change nothing: the forms of absent causes, and all of absent effects."""
+    values, parameters = plant.values, plant.parameters
+    idle: set[str] = set()
+    needed: set[str] = set()
+    for cause in plant.candidates.values():
+        absent = values[cause.strength] == parameters[cause.strength].null
+        (idle if absent else needed).update(cause.forms)
+    gone = {f"{e.name}.{key}" for e in plant.effects if e.absent for key in e.parameters()}
+    return frozenset(idle - needed | gone)
 
 
 def recorded_runs(loops: Loops, runs: int, say: Callable[[str], None]) -> Checked:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -23,6 +23,9 @@ from workbench.contracts import Controller, Estimator
 from workbench.errors import Message, UnknownNameError, listed, nearest
 from workbench.filtering import consistent_start
 from workbench.plant import Plant
+
+if TYPE_CHECKING:
+    from studies.specification import Limit
 
 Asked = TypeVar("Asked")  # a scenario of a slide, or a task of a bench
 POSITION_NOISE_M, POSITION_GRID_M, PRESSURE_NOISE_PA = 5e-6, 5e-6, 500.0
@@ -109,6 +112,7 @@ def check(
     *,
     believed: Plant | None = None,
     seed: int = 0,
+    limits: Sequence[Limit] = (),
 ) -> Check:
     """Every design with every estimator in every scenario.
 
@@ -118,6 +122,8 @@ def check(
         The plant that moves, at its full level.
     believed
         The plant in the estimators, the same one by default.
+    limits
+        Of a specification, which count besides the plant's own.
     """
     truth, model = plant.lean(), (believed or plant).lean()
     chosen = [SCENARIOS[name](stroke_m(plant)) for name in scenarios]
@@ -125,7 +131,7 @@ def check(
     every = every_loop(designs, estimators, chosen, standard_estimator, model)
     for design, estimator, observer, scenario in every:
         record = run(truth, designs[design], observer, scenario, seed)
-        rows.append(measure(truth, record, scenario, design, estimator))
+        rows.append(measure(truth, record, scenario, design, estimator, limits))
         records.append(record)
     return Check(tuple(rows), tuple(records))
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import inf, isnan, nan
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +17,9 @@ from studies.text import clock, columns, until
 from workbench.closed_loop import LoopRecord
 from workbench.effects.valve_command import DeadZone
 from workbench.plant import Plant
+
+if TYPE_CHECKING:
+    from studies.specification import Limit
 
 SETTLED_M, GOAL_CYCLE_M = 0.2e-3, 0.1e-3
 LOST_SHARE = 0.1  # of the amplitude: a reference that is followed worse than this is lost
@@ -40,7 +44,7 @@ class Metrics:
     activity_v, switches
         Sum of all changes of the command; how often the valve goes over from one side to the other.
     violation_s
-        Time outside the limits of position and pressures.
+        Time outside the limits of position and pressures, or outside those of a specification.
     amplitude_m, way_m
         Of a reference that does not end at rest, and of a step; NaN for the other one.
     solve_median_s, solve_p99_s
@@ -89,9 +93,14 @@ class Metrics:
 
 
 def measure(
-    plant: Plant, record: LoopRecord, scenario: Scenario, design: str, estimator: str
+    plant: Plant,
+    record: LoopRecord,
+    scenario: Scenario,
+    design: str,
+    estimator: str,
+    limits: Sequence[Limit] = (),
 ) -> Metrics:
-    """The metrics of one run."""
+    """The metrics of one run, against the limits of a specification too if there are any."""
     recording, wanted = record.recording, scenario.reference_m
     position, error = recording[POSITION], recording[POSITION] - wanted
     command = recording.rows(plant.model.commands)
@@ -105,7 +114,7 @@ def measure(
         air_kg=air_used_kg(plant, record),
         activity_v=float(np.abs(np.diff(command)).sum()),
         switches=valve_switches(plant, command[0]),
-        violation_s=_violation_s(plant, record),
+        violation_s=_violation_s(plant, record, limits),
         solve_median_s=float(np.median(record.control_time_s)),
         solve_p99_s=float(np.percentile(record.control_time_s, 99)),
         estimate_median_s=float(np.median(record.estimate_time_s)),
@@ -182,11 +191,14 @@ def air_used_kg(plant: Plant, record: LoopRecord, sample_time_s: float = SAMPLE_
     return float(taken.map(x.shape[1])(x, u, d, p).full().sum() * sample_time_s)
 
 
-def _violation_s(plant: Plant, record: LoopRecord) -> float:
+def _violation_s(plant: Plant, record: LoopRecord, limits: Sequence[Limit] = ()) -> float:
     position, pressures = record.recording[POSITION], record.recording.rows(PRESSURES)
     highest_pa = plant.values[SUPPLY] - BELOW_SUPPLY_PA
     outside = (position < MARGIN_M) | (position > stroke_m(plant) - MARGIN_M)
     outside |= ((pressures < LOWEST_PA) | (pressures > highest_pa)).any(axis=0)
+    for limit in limits:
+        value = record.recording[limit.figure]
+        outside |= (value < limit.least) | (value > limit.most)
     return float(outside.sum() * SAMPLE_TIME_S)
 
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from math import nan, sqrt
 from typing import Any
 
 import numpy as np
+from scipy.stats import t as student
 
-from studies.estimator_runs import band
+from studies.estimator_runs import BAND, band
 from studies.study import Claim
 from studies.text import columns, number, percent
 
@@ -36,22 +38,42 @@ def courses(rows: Sequence[Mapping[str, Any]]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def summary(rows: Sequence[Mapping[str, Any]]) -> dict[str, float]:
-    """Means over moving samples of all runs, and the share of samples inside their own band."""
+    """Mean NEES and NIS in motion with their bands, and the share of samples inside their own.
+
+    A sample's band is that of as many independent values as there are runs.  All samples of a run
+    tell more, but not as much as if they were independent: runs are, so the spread of their means
+    says how far the mean of these may lie from what is exact.
+    """
     values, nis, moving = (
         np.array([row[key] for row in rows], dtype=float) for key in ("nees", "nis", "moving")
     )
     mean, there = courses(rows)
     judged = [(m, *band(DEGREES, n)) for m, n in zip(mean, there, strict=True) if np.isfinite(m)]
     inside = [low <= m <= high for m, low, high in judged]
-    low, high = band(DEGREES, len(rows))
+    found, low, high = _of_runs(values, moving, DEGREES)
+    nis_found, nis_low, nis_high = _of_runs(nis, moving, OUTPUTS)
     return {
-        "nees": float(values[moving > 0].mean()),
+        "nees": found,
         "low": low,
         "high": high,
         "inside": float(np.mean(inside)) if inside else float("nan"),
-        "nis": float(nis[moving > 0].mean()),
+        "nis": nis_found,
+        "nis_low": nis_low,
+        "nis_high": nis_high,
         "runs": len(rows),
     }
+
+
+def _of_runs(values: np.ndarray, moving: np.ndarray, exact: float) -> tuple[float, float, float]:
+    """Mean of the runs' means in motion, and the band about what is exact by their spread.
+
+    Student's at 95 %; both ends are NaN of a single run, whose spread nobody knows.
+    """
+    pairs = zip(values, moving > 0, strict=True)
+    means = np.array([row[there].mean() for row, there in pairs if there.any()])
+    n = len(means)
+    half = nan if n < 2 else student.ppf(0.5 + BAND / 2.0, n - 1) * means.std(ddof=1) / sqrt(n)
+    return float(means.mean()), float(max(exact - half, 0.0)), float(exact + half)
 
 
 def velocity_claims(found: Mapping[str, Mapping[str, float]]) -> Iterator[Claim]:
@@ -120,16 +142,16 @@ def consistency_text(
     for kind, rows in found.items():
         for name, several in rows.items():
             s = summary(several)
-            low, high = band(OUTPUTS, len(several))
             lines.append(
                 (kind, name, str(s["runs"]), number(s["nees"], 3),
                  f"{s['low']:.2f} to {s['high']:.2f}", percent(s["inside"]),
-                 number(s["nis"], 3), f"{low:.2f} to {high:.2f}", percent(coloured[kind][name]))
+                 number(s["nis"], 3), f"{s['nis_low']:.2f} to {s['nis_high']:.2f}",
+                 percent(coloured[kind][name]))
             )  # fmt: skip
     return (
         f"{columns(head, lines)}\nposition, velocity and pressures in motion, on average over "
-        "runs; drawn parameters are not judged; 5 % of the lags are coloured if innovations are "
-        "white"
+        "runs, in bands by the spread of their means; drawn parameters are not judged; 5 % of the "
+        "lags are coloured if innovations are white"
     )
 
 

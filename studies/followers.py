@@ -7,6 +7,7 @@ as in paper 001; its estimator does not know.  No design was tuned on these draw
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -53,7 +54,9 @@ def follower_runs(kept: Kept, number: int, say: Callable[[str], None]) -> Runs:
 def drawn_plant(plant: Plant, number: int) -> Plant:
     """The plant of a draw, the same at every call."""
     rng = np.random.default_rng(FIRST_SEED + number)
-    return drawn(default_rig(plant), rng).with_values(PAUSES.get(plant.name, {}))
+    pauses = PAUSES.get(plant.name, {})  # there before the draw, so that their lengths are drawn
+    rig = default_rig(plant.with_values(pauses))
+    return drawn(replace(rig, fixed=rig.fixed | pauses.keys()), rng)
 
 
 def _run(plant: Plant, method: str, number: int) -> dict[str, dict[str, list[float | None]]]:

@@ -85,6 +85,7 @@ def row_of(task: Task, said: Answer) -> Row:
         own_drop=own.drop_train if own else nan,
         balance=balance,
         balance_right=balance in bench.laws.get(case.hidden or "", ()),
+        crowd=len(ranking[0].crowd),
     )
 
 

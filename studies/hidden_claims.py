@@ -61,7 +61,7 @@ def _of_effects(rows: Sequence[Row], enough: Enough) -> Iterator[Claim]:
     visible = [r for r in rows if r.visible]
     effects = [r for r in rows if r.kind is Kind.EFFECT]
     named = [r for r in effects if r.verdict in (Verdict.FOUND.value, Verdict.TIE.value)]
-    told = [r for r in visible if r.verdict != Verdict.RECORDING_TOO_WEAK.value]
+    told = [r for r in visible if not r.crowd]
     asked = (
         ("visible effects first", [r.place == 1 for r in visible], 0.90),
         ("visible effects first or tied", [r.tied for r in visible], 0.97),

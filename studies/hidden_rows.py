@@ -53,6 +53,8 @@ class Row:
         Share of the misfit that the refit with the hidden effect removes, NaN without.
     balance, balance_right
         Where something is missing, and whether a hidden law acts there.
+    crowd
+        How many more do the same as what leads than a tie prints.
     accepted, wrong
         Of a pair: how many of the two were accepted, and how many that are not there.
     """
@@ -73,6 +75,7 @@ class Row:
     balance_right: bool = False
     accepted: int = 0
     wrong: int = 0
+    crowd: int = 0
     seconds: float = nan
 
     @property
@@ -88,8 +91,8 @@ def plain(row: Row) -> dict[str, Any]:
 
 
 def row_again(kept: Mapping[str, Any]) -> Row:
-    """The row of what :func:`plain` gave, whatever else was kept with it."""
-    known = {name: kept[name] for name in Row.__dataclass_fields__}
+    """The row of what :func:`plain` gave, whatever else was kept with it, also by older code."""
+    known = {name: kept[name] for name in Row.__dataclass_fields__ if name in kept}
     numbers = {k: nan if v is None else v for k, v in known.items()}
     return replace(Row(**numbers), kind=Kind(numbers["kind"]))
 

@@ -106,7 +106,8 @@ def _unpacked(key: str, origin: str, rig: bytes, *content: Any) -> Setup:
 @lru_cache(maxsize=1)
 def _built(setup: Setup) -> Loops:
     designs = {setup.path: setup.design}
-    return loops_of(setup.rig, designs, setup.estimators, setup.scenarios)
+    loops = loops_of(setup.rig, designs, setup.estimators, setup.scenarios)
+    return replace(loops, asked=setup.asked)
 
 
 @dataclass(frozen=True)

@@ -16,10 +16,9 @@ from typing import Any
 import numpy as np
 
 from controllers import CONTROLLERS
-from controllers.mpc_spec import MpcSpec
 from controllers.spec import replaced
 from linearize.axes import stroke_m
-from linearize.standard import POSITION, PRESSURES, SHIFT_MODES, SLIDE_MODES, SUPPLY, VELOCITY
+from linearize.standard import SHIFT_MODES, SLIDE_MODES
 from studies.asked_lines import (
     ALL_LINES,
     ARRIVED,
@@ -149,32 +148,6 @@ def read_specification(
     numbers = {name: _numbers(text, name) for name in CONTROLLERS if name in text.tree}
     text.finish()
     return Specification(tuple(asked), numbers)
-
-
-def design_numbers(spec: Specification, method: str, plant: Plant) -> dict[str, Any]:
-    """Numbers of a design: those of its table, and for an MPC its limits where the table has none.
-
-    The MPC keeps one speed both ways and one pair of limits for both pressures: the tightest.
-    """
-    own = dict(spec.numbers.get(method, {}))
-    if method not in CONTROLLERS or CONTROLLERS[method].spec is not MpcSpec:
-        return own
-    numbers: dict[str, float] = {}
-    limits = {each.figure: each for each in spec.asked if isinstance(each, Limit)}
-    if POSITION in limits:
-        place = limits[POSITION]
-        numbers["lowest_m"] = max(place.least, 0.0)
-        numbers["below_end_m"] = max(stroke_m(plant) - place.most, 0.0)
-    if VELOCITY in limits:
-        ways = -limits[VELOCITY].least, limits[VELOCITY].most
-        numbers["fastest_m_s"] = min(speed for speed in ways if speed > 0.0)
-    pressures = [limits[name] for name in PRESSURES if name in limits]
-    if pressures:
-        highest_pa = min(each.most for each in pressures)
-        numbers["below_supply_pa"] = max(float(plant.values[SUPPLY]) - highest_pa, 0.0)
-        if (lowest_pa := max(each.least for each in pressures)) > 0.0:
-            numbers["lowest_pa"] = lowest_pa
-    return numbers | own
 
 
 def _known(plant: Plant) -> tuple[Mapping[str, str], dict[str, bool]]:

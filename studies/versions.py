@@ -7,10 +7,12 @@ from collections.abc import Iterable
 from functools import cache
 from hashlib import sha256
 from importlib.metadata import version
+from itertools import product
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 BELOW = ("workbench", "linearize", "controllers", "estimators")
+WRITTEN_IN = ("py", "c", "h")  # what is compiled decides numbers as well
 STANDS_ON = (
     "numpy", "scipy", "casadi", "control", "cvxpy", "daqp", "filterpy", "osqp", "matplotlib",
 )  # fmt: skip
@@ -19,7 +21,7 @@ STANDS_ON = (
 @cache
 def code_of_loops() -> str:
     """A hash of the code that closes a loop; figures, page and reports are left out."""
-    return _hash([*ROOT.glob("studies/*.py"), *_python((*BELOW, "studies/truth"))])
+    return _hash([*ROOT.glob("studies/*.py"), *_code_in((*BELOW, "studies/truth"))])
 
 
 def work_folder(folder: Path) -> Path:
@@ -30,7 +32,7 @@ def work_folder(folder: Path) -> Path:
 @cache
 def code() -> str:
     """A hash of all that decides a study, its figures and its text."""
-    return _hash([*_python((*BELOW, "studies")), *ROOT.glob("studies/**/*.json")])
+    return _hash([*_code_in((*BELOW, "studies")), *ROOT.glob("studies/**/*.json")])
 
 
 def versions() -> dict[str, str]:
@@ -39,8 +41,9 @@ def versions() -> dict[str, str]:
     return {"code": code()[:16], "python": platform.python_version()} | libraries
 
 
-def _python(packages: Iterable[str]) -> list[Path]:
-    return [file for package in packages for file in ROOT.glob(f"{package}/**/*.py")]
+def _code_in(packages: Iterable[str]) -> list[Path]:
+    every = product(packages, WRITTEN_IN)
+    return [file for package, end in every for file in ROOT.glob(f"{package}/**/*.{end}")]
 
 
 def _hash(files: Iterable[Path]) -> str:

@@ -52,6 +52,44 @@ def test_no_design_is_written_where_a_number_leads_nowhere(rig, tmp_path, method
     assert [p.name for p in tmp_path.iterdir()] == ["spec.toml"]
 
 
+ONE = 'limits = {"slide.position" = "1 mm"}'
+LATE = '[limits]\nslide.velocity = "1 m/s"\nslide.position = ["289 mm", "300 mm"]'
+FAINT = '[limits]\nchamber_a.pressure = "1 bar"'
+APART = '[limits]\nchamber_a.pressure = ["4 bar", "5 bar"]\nchamber_b.pressure = ["2 bar", "3 bar"]'
+HIGH = '[limits]\nchamber_a.pressure = ["8 bar", "9 bar"]'
+
+
+@pytest.mark.parametrize(
+    ("method", "limits", "said"),
+    [
+        ("mpc", ONE, "spec.toml:1: limits.slide.position: 0 to 1 mm leaves mpc no room; expected "
+         "some of it above 2 mm, the least that mpc keeps"),
+        ("mpc", LATE, "spec.toml:3: limits.slide.position: 289 to 300 mm leaves mpc no room; "
+         "expected some of it below 288 mm, the most that mpc keeps"),
+        ("nonlinear-mpc", FAINT, "spec.toml:2: limits.chamber_a.pressure: at most 1 bar leaves "
+         "nonlinear-mpc no room; expected some of it above 1.2 bar, the least that nonlinear-mpc "
+         "keeps"),
+        ("mpc", APART, "spec.toml:3: limits.chamber_b.pressure: 2 to 3 bar leaves mpc no room; "
+         "expected some of it above 4 bar, of limits.chamber_a.pressure"),
+        ("mpc", HIGH, "spec.toml:2: limits.chamber_a.pressure: 8 to 9 bar leaves mpc no room; "
+         "expected some of it below 7 bar, the most that mpc keeps"),
+        ("mpc", "[mpc]\nbelow_supply_pa = 6e5", "spec.toml:1: mpc: lowest_pa 120000, "
+         "below_supply_pa 600000 leave no room on servo_drive; expected less than the supply "
+         "pressure between them"),
+    ],
+)  # fmt: skip
+def test_limits_that_leave_an_mpc_no_room_are_told_as_they_were_asked_for(
+    rig, tmp_path, method, limits, said
+):
+    spec = tmp_path / "spec.toml"
+    spec.write_text(f"{limits}\n")
+    made = tmp_path / "design.toml"
+    answer = call("design", rig, "--controller", method, "--spec", spec, "-o", made, "-q")
+
+    assert answer.exit_code == 2 and not made.exists()
+    assert answer.stderr.removeprefix(f"workbench: {tmp_path}/").strip() == said
+
+
 def test_fine_weights_are_told_by_their_small_margins_and_not_by_words_of_a_library(rig, tmp_path):
     """scipy's "ill-conditioned matrix" was of coordinates, whose choice proves nothing."""
     spec = tmp_path / "spec.toml"

@@ -186,7 +186,13 @@ def test_the_best_lag_is_taken_for_the_derivative():
 
 
 def rows(nees_value, n=50):
-    return [{"nees": [nees_value] * 20, "nis": [3.0] * 20, "moving": [0] * 5 + [1] * 15}] * n
+    """Runs whose means differ by one, as those of ten independent samples do."""
+    apart = np.linspace(-1.0, 1.0, n) * np.sqrt(3.0)
+    return [
+        {"nees": [9.0] * 5 + [nees_value + off] * 15, "nis": [3.0 + off] * 20,
+         "moving": [0] * 5 + [1] * 15}
+        for off in apart
+    ]  # fmt: skip
 
 
 def test_consistency_is_claimed_inside_the_band_and_not_beyond():
@@ -195,6 +201,21 @@ def test_consistency_is_claimed_inside_the_band_and_not_beyond():
     assert inside.holds and not outside.holds
     assert summary(rows(4.2))["nis"] == pytest.approx(3.0)
     assert np.isnan(courses(rows(4.0))[0][:5]).all()
+
+
+@pytest.mark.parametrize("share", [0.85, 1.15])
+def test_a_covariance_that_is_off_by_15_percent_is_not_called_consistent(share):
+    """50 runs of 15 samples in motion, each as good as ten independent ones."""
+    (claim,) = consistency_claims({"ekf": rows(4.0 * share)})
+    found = summary(rows(4.0 * share))
+    half = 2.0096 * np.std([each["nees"][-1] for each in rows(4.0)], ddof=1) / 50**0.5
+
+    assert not claim.holds
+    assert (found["low"], found["high"]) == pytest.approx((4.0 - half, 4.0 + half), rel=1e-4)
+    assert (found["nis_low"], found["nis_high"]) == pytest.approx(
+        (3.0 - half, 3.0 + half), rel=1e-4
+    )
+    assert not next(consistency_claims({"ekf": rows(4.0, 1)})).holds  # of one run nobody knows
 
 
 def test_velocity_needs_less_than_half_of_the_derivatives_error():

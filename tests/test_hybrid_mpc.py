@@ -62,8 +62,8 @@ def test_a_valve_that_is_switched_too_soon_is_refused(response):
 @given(st.integers(0, 1), st.integers(0, HOLD))
 def test_every_plan_keeps_the_least_time_between_switches(response, level, wait):
     found = plans(level, wait, HOLD, N)
-    newest = np.array([*[1 - level] * 16, *[level] * 20])[-20 - (HOLD - wait) :][:20]
-    past = int(packed(newest)[-1]) if wait else level * MASK
+    old = HOLD - wait  # samples for which the level has stood
+    past = int(packed(np.array([1 - level] * (20 - old) + [level] * old))[-1])
 
     assert len(found.switches) == len(switching_times(0, HOLD))
     for row, count in zip(found.commands, found.switches, strict=True):
@@ -71,7 +71,10 @@ def test_every_plan_keeps_the_least_time_between_switches(response, level, wait)
         assert count in (len(changes), NEVER)
         assert (np.diff(changes) >= HOLD).all()
         assert (changes >= wait).all()
-    assert response.keeps(level * MASK if not wait else past, found.packed).all() or wait
+    assert response.keeps(past, found.packed).all()
+    if wait:
+        sooner = plans(level, wait - 1, HOLD, N)
+        assert not response.keeps(past, sooner.packed).all()
 
 
 def test_all_histories_keep_the_least_time_and_no_other_does():

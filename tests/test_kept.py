@@ -1,5 +1,7 @@
 """What is kept of long work: rows that survive a kill, and only those of the code that runs."""
 
+import pytest
+
 from studies import controllers_study, versions
 from studies.kept import Kept
 from studies.study import Extent
@@ -38,6 +40,22 @@ def test_pieces_that_other_code_finished_are_done_again(tmp_path, monkeypatch):
         counts.append(len(asked))
 
     assert counts == [counts[0], counts[0], 2 * counts[0], 2 * counts[0]]
+
+
+@pytest.mark.parametrize(
+    "file", ["controllers/judging.c", "workbench/lanes.h", "estimators/deeper/ekf.py"]
+)
+def test_what_is_compiled_decides_of_what_code_a_piece_is_too(tmp_path, monkeypatch, file):
+    monkeypatch.setattr(versions, "ROOT", tmp_path)
+    (tmp_path / file).parent.mkdir(parents=True)
+    hashes = {"loops": [], "all": []}
+    for text in ("a", "b", "a"):
+        (tmp_path / file).write_text(text)
+        hashes["loops"].append(versions.code_of_loops.__wrapped__())
+        hashes["all"].append(versions.code.__wrapped__())
+
+    for first, second, third in hashes.values():
+        assert first == third != second
 
 
 def test_a_truth_decides_what_code_a_piece_is_of(tmp_path, monkeypatch):

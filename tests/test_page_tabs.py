@@ -10,6 +10,7 @@ from bokeh.document import Document
 
 from linearize.standard import standard_modes
 from studies.cuts_file import modes_by_cuts
+from studies.design_numbers import design_numbers
 from studies.page import tasks
 from studies.page.control_tasks import ModeChoice, modes_of
 from studies.page.control_verbs import with_offers
@@ -19,7 +20,7 @@ from studies.page.pages import TABS, all_tabs
 from studies.page.session import Role, Session, recordings, with_opened, with_rig, with_role
 from studies.page.verbs import with_compared
 from studies.page.view import Page
-from studies.specification import design_numbers, read_specification
+from studies.specification import read_specification
 from workbench.errors import InputError
 from workbench.rig import default_rig
 

@@ -7,6 +7,7 @@ from studies.draws import kept_rows
 from studies.kept import Kept
 from studies.robustness import Line, Robustness
 from studies.robustness_study import Draw, measured, outcome, summary
+from studies.text import number
 from studies.versions import work_folder
 from studies.workers import Workers, working_with
 
@@ -63,6 +64,19 @@ def test_worst_draws_are_the_farthest_out_of_those_that_miss(found):
     text = found.text
     assert f"draw {line.worst[0] + 1}: " in text
     assert "slide.mass -" in text
+
+
+def test_the_median_lies_in_the_middle_and_what_95_percent_reach_is_a_draw():
+    """Of an even number of draws between two of them, and infinite where half are lost."""
+    four = np.array([1.0, 2.0, 4.0, 8.0])
+    lines = [
+        Line(name, "at most 9", values, values > 9.0)
+        for name, values in (("all", four), ("lost", np.array([1.0, np.inf, 4.0, np.inf])))
+    ]
+    _, every, lost, *_ = Robustness((*lines,), {MASS: np.arange(4.0)}).text.splitlines()
+
+    assert every.split()[4:7] == ["3", "8", "8"]
+    assert lost.split()[4:5] == [number(np.inf, 3)]
 
 
 def test_too_few_draws_say_nothing_of_influences(found):

@@ -12,13 +12,13 @@ from hypothesis import strategies as st
 from controllers.mpc_spec import MpcSpec
 from linearize.axes import stroke_m
 from studies.checking import drawn_plant
+from studies.design_numbers import design_numbers
 from studies.scenarios import SCENARIOS
 from studies.shift_check import SHIFTS
 from studies.specification import (
     SHIFT_LINES,
     SLIDE_LINES,
     Specification,
-    design_numbers,
     read_specification,
 )
 from studies.verdicts import Figures, drawn_values, judge

@@ -76,11 +76,26 @@ def test_a_visible_effect_on_rank_four_fails_three_claims():
 
 
 def test_where_more_than_three_are_said_to_do_the_same_the_top_three_claim_nothing():
-    crowd = row("sensor_offset", "constant_force", 4, tied=True, verdict="recording_too_weak")
+    weak = {"tied": True, "verdict": "recording_too_weak"}
+    crowd = row("sensor_offset", "constant_force", 4, crowd=2, **weak)
     said = held(outcome([row(seed=k) for k in range(9)] + [crowd]))
 
     assert said["visible effects in the top three"]
     assert said["visible effects first or tied"]
+
+
+def test_a_recording_called_too_weak_for_another_reason_counts_in_the_top_three():
+    weak = row("sensor_offset", "constant_force", 4, verdict="recording_too_weak")
+    said = held(outcome([row(seed=k) for k in range(9)] + [weak]))
+
+    assert not said["visible effects in the top three"]
+
+
+def test_an_answer_of_code_that_told_no_crowd_is_read_without_one():
+    kept = plain(row())
+    del kept["crowd"]
+
+    assert row_again(kept) == row_again(plain(row())) and row_again(kept).crowd == 0
 
 
 def test_a_sample_refutes_a_bar_only_where_chance_does_not_explain_it():

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from controllers.switched_feedback import HOLD, averaged, switched_lq, switched_pd
+from controllers.unseen import HELD_S
 from linearize.shifting import STATES
 from linearize.standard import shift_modes
 from workbench.contracts import Estimate
@@ -66,3 +67,37 @@ def test_the_average_of_pwm_is_the_share_in_steps_of_the_least_time(designs):
         rows.append(command.value)
 
     assert np.mean(rows, axis=0) == pytest.approx([2 / 3, 1 / 3], abs=0.02)
+
+
+@pytest.mark.parametrize("name", ["PD", "LQ", "PD, PWM", "LQ, PWM"])
+def test_without_an_estimate_the_last_command_holds_and_then_both_valves_are_shut(designs, name):
+    """As every other law does, with a note; PWM goes on in its period where it was."""
+    made, lost = designs[name], seen([FULL, AIR, np.nan, 0.1])
+    command = made.step(made.start(), TO_HIGH, seen([AIR, AIR, -12e-3, 0.0]))
+    held = round(HELD_S / made.sample_time_s)
+    assert command.value.any() and "fallback" not in command.notes
+    phase, rows = command.memory.phase, []
+    for _ in range(held + 5):
+        command = made.step(command, TO_HIGH, lost)
+        assert command.notes["fallback"] == 1.0
+        rows.append(command.value)
+
+    assert (np.array(rows[:held]) == rows[0]).all() and rows[0].any()
+    assert not np.any(rows[held:])
+    assert command.memory.phase == phase
+    again = made.step(command, TO_HIGH, seen([AIR, AIR, -12e-3, 0.0]))
+    assert "fallback" not in again.notes and again.memory.unseen == 0
+
+
+def test_a_valve_keeps_its_least_time_where_the_estimate_comes_and_goes(designs):
+    """It comes back a sample after the valves were shut."""
+    made = designs["PD"]
+    there, lost = seen([FULL, AIR, -12e-3, 0.0]), seen([np.nan] * 4)
+    command, rows = made.start(), []
+    for k in range(200):
+        command = made.step(command, TO_HIGH, lost if k % 40 in range(10, 31) else there)
+        rows.append(command.value)
+    for valve in np.array(rows).T:
+        changes = np.flatnonzero(np.diff(valve))
+        assert (np.diff(changes) >= HOLD).all()
+    assert np.diff(rows, axis=0).any()

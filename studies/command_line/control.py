@@ -110,23 +110,24 @@ def design(
         from controllers.design_file import gains, write_design
         from studies.design_document import design_document
         from studies.design_doubts import design_doubts
+        from studies.design_numbers import design_numbers
         from studies.design_report import design_report
         from studies.design_text import design_texts
         from studies.sample_times import require_multiple
-        from studies.specification import design_numbers, read_specification
+        from studies.specification import read_specification
         from workbench.errors import listed
         from workbench.rig import load_rig
 
         writable(output, json, reads=[rig, spec])
         known = load_rig(rig)
         asked = read_specification(spec, known) if spec else None
-        numbers = design_numbers(asked, controller, known.plant) if asked else {}
         if asked and asked.numbers and controller not in asked.numbers:
             tables, are = asked.numbers, "are" if len(asked.numbers) > 1 else "is"
             told = f"{listed([f'[{name}]' for name in tables])} {are} not for {controller}"
             typer.echo(f"warning: {spec}: {told}, and not used", err=True)
         say(f"designing {controller}")
         with _placed_in(spec):
+            numbers = design_numbers(asked, controller, known.plant) if asked else {}
             found = design_controller(controller, known.plant, numbers)
             time_s, name = found.controller.sample_time_s, f"{controller}.sample_time_s"
             require_multiple(known.plant, time_s, name)
@@ -161,4 +162,10 @@ def _placed_in(spec: Path | None) -> Iterator[None]:
         if spec is None:
             raise
         text = RigText(read_text(spec)[0], str(spec), "a specification")
-        raise text.placed(error, lambda message: tuple(message.name.split("."))) from error
+        raise text.placed(error, lambda message: _place(message.name)) from error
+
+
+def _place(name: str) -> tuple[str, ...]:
+    """Where a specification has a number of a design, or the limit of a state."""
+    table, _, state = name.partition(".")
+    return (table, state) if table == "limits" else tuple(name.split("."))

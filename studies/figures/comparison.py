@@ -108,6 +108,7 @@ def _draw_error(axes: Axes, each: RecordingComparison, name: str) -> None:
     label = f"error, {each.judged}"
     axes.plot(time_s, error, linestyle=style, color=colour, linewidth=0.6, label=label)
     axes.set_ylabel(f"error\n({display_unit(name)})")
+    axes.set_label(f"error of {labelled(name)}")  # in the table
 
 
 def _mark_worst(axes: Axes, each: RecordingComparison) -> None:

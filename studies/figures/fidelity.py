@@ -34,7 +34,7 @@ def fidelity_figure(worse: Mapping[str, Mapping[str, float]], marks: Sequence[st
             values = [min(worse[name][mark], edge) for name in names]
             at = np.arange(len(names)) + APART * ((len(marks) - 1) / 2.0 - k)
             axes.plot(values, at, marker, color=colour, markersize=4, label=mark)
-        axes.axvline(1.0, color=BLACK, linestyle="--", linewidth=0.8)
+        axes.axvline(1.0, color=BLACK, linestyle="--", linewidth=0.8, label="_whole model")
         axes.set_xscale("log")
         low, high = axes.get_xlim()
         axes.set_xticks([tick for tick in TICKS if low < tick < high])

@@ -67,6 +67,7 @@ def _draw_error(axes: Axes, runs: dict[str, LoopRecord], name: str) -> None:
         error = (recording[name] - recording[REFERENCE + name]) / display_scale(name).factor
         axes.plot(recording.time_s, error, color=f"C{k}", label=run)
     axes.set_ylabel(f"error\n({display_unit(name)})")
+    axes.set_label(f"error of {labelled(name)}")  # in the table
 
 
 def _lines(label: str) -> str:

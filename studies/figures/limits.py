@@ -66,6 +66,6 @@ def _panel(limit: Limit, runs: Sequence[tuple[str, Recording]], last: bool) -> P
         x="time (s)" if last else "",
         y=f"{state} ({limit.unit})",
         lines=lines,
-        levels={("limit" if k == 0 else "_"): end for k, end in enumerate(ends)},
+        levels={("limit" if k == 0 else "_other limit"): end for k, end in enumerate(ends)},
         y_range=(min(values) - room, max(values) + room),
     )

@@ -66,14 +66,17 @@ def influence_figure(found: Robustness) -> Figure:
 def _draw_spread(axes: Axes, line: Line, limit: float | None) -> None:
     inside = np.sort(line.found[np.isfinite(line.found)])
     share = 100.0 * (1.0 + np.arange(len(inside))) / len(line.found)
-    axes.step(inside, share, where="post", color=BLUE)
+    axes.step(inside, share, where="post", color=BLUE, label="share up to it")
     missed = inside[limit < inside] if limit is not None else inside[:0]
     if len(missed):  # an empty line that is not clipped would upset the layout
-        axes.plot(missed, np.zeros(len(missed)), "|", color=RED, markersize=6, clip_on=False)
+        look = {"color": RED, "markersize": 6, "clip_on": False}
+        axes.plot(missed, np.zeros(len(missed)), "|", label="missed", **look)
     if limit is not None:
-        axes.axvline(limit, color=BLACK, linestyle="--", linewidth=0.8)
+        axes.axvline(limit, color=BLACK, linestyle="--", linewidth=0.8, label="asked for")
     axes.set_ylim(0.0, 100.0)
-    axes.set_xlabel(f"{line.name} ({line.unit})" if line.unit else line.name)
+    words = f"{line.name} ({line.unit})" if line.unit else line.name
+    axes.set_xlabel(words)
+    axes.set_label(words)  # in the table; the other axis is the same in all panels
 
 
 def _draw_map(axes: Axes, values: np.ndarray, rows: list[str], over: list[str]) -> None:

@@ -7,7 +7,6 @@ give the same bytes.
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,11 +14,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from studies.figures.drawn_numbers import write_drawn
 from workbench.errors import whole_file
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.collections import QuadMesh
     from matplotlib.figure import Figure
 
 COLUMN_IN, PAGE_IN = 3.5, 7.16
@@ -92,63 +90,7 @@ def save(figure: Figure, stem: Path, command: str) -> Path:
             with whole_file(stem.with_name(f"{stem.name}.{ending}")) as unfinished:
                 figure.savefig(unfinished, format=ending, metadata=metadata)
     with whole_file(stem.with_name(f"{stem.name}.csv")) as unfinished:
-        _write_drawn(figure, unfinished)
+        write_drawn(figure, unfinished)
     with whole_file(stem.with_name(f"{stem.name}.txt")) as unfinished:
         unfinished.write_text(command + "\n", encoding="utf-8")
     return stem.with_name(f"{stem.name}.svg")
-
-
-def _write_drawn(figure: Figure, path: Path) -> None:
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(("panel", "curve", "x", "y"))
-        for number, axes in enumerate(figure.axes, start=1):
-            panel = axes.get_title() or axes.get_ylabel() or axes.get_xlabel() or str(number)
-            panel = " ".join(panel.split())  # where a label breaks its line, a cell does not
-            for curve, x, y in _curves(axes):
-                writer.writerows(
-                    (panel, curve, _short(a), _short(b)) for a, b in zip(x, y, strict=True)
-                )
-
-
-def _curves(axes: Axes) -> Iterator[tuple[str, list, list]]:
-    """Label, x and y of each line, cell of a map, point cloud and group of bars."""
-    for line in axes.lines:
-        yield str(line.get_label()), list(line.get_xdata()), list(line.get_ydata())
-    for mesh in axes.collections:
-        if hasattr(mesh, "get_coordinates"):
-            yield from _cells(mesh)
-    for cloud in axes.collections:
-        if hasattr(cloud, "get_coordinates"):
-            continue
-        points = np.ma.getdata(cloud.get_offsets())
-        if len(points) > 1:
-            yield str(cloud.get_label()), list(points[:, 0]), list(points[:, 1])
-    for bars in axes.containers:
-        if not hasattr(bars, "patches"):
-            continue
-        flat = getattr(bars, "orientation", "vertical") == "horizontal"
-        axis = axes.yaxis if flat else axes.xaxis
-        ticks = axis.get_ticklocs()
-        labels = axis.get_major_formatter().format_ticks(ticks)  # also where a panel hides them
-        words = {round(float(at), 6): label for at, label in zip(ticks, labels, strict=True)}
-        sizes = [p.get_width() if flat else p.get_height() for p in bars.patches]
-        middles = [
-            p.get_y() + p.get_height() / 2 if flat else p.get_x() + p.get_width() / 2
-            for p in bars.patches
-        ]
-        nearest = [min(words, key=lambda at, m=m: abs(at - m), default=m) for m in middles]
-        yield str(bars.get_label()), [words.get(at, at) for at in nearest], sizes
-
-
-def _cells(mesh: QuadMesh) -> Iterator[tuple[str, list, list]]:
-    """Value of each cell that is shown, and its middle."""
-    corners, values = np.asarray(mesh.get_coordinates()), np.ma.masked_invalid(mesh.get_array())
-    middles = (corners[1:, 1:] + corners[:-1, :-1]) / 2.0
-    for row, column in zip(*np.nonzero(~np.ma.getmaskarray(values)), strict=True):
-        x, y = middles[row, column]
-        yield f"{values[row, column]:.6g}", [x], [y]
-
-
-def _short(value: object) -> str:
-    return value if isinstance(value, str) else f"{float(value):.6g}"

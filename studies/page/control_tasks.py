@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from controllers.design_file import design, write_design
@@ -14,6 +14,7 @@ from linearize.prediction import prediction_of
 from linearize.stopped import has_stops
 from linearize.visits import joined, recorded_visits, windows
 from studies.checking import Checked, loops_of, recorded_runs, styled_figures
+from studies.design_numbers import design_numbers
 from studies.design_report import design_report
 from studies.design_text import design_texts
 from studies.mode_choice import FINE, chosen_modes, regions_of
@@ -22,7 +23,7 @@ from studies.modes_text import modes_text
 from studies.page.drawn import drawings
 from studies.page.mode_cuts import cuts_of
 from studies.sample_times import require_multiple
-from studies.specification import design_numbers, read_specification
+from studies.specification import read_specification
 from studies.text import number
 from workbench.errors import whole_file
 from workbench.recording import Recording
@@ -125,5 +126,5 @@ def close_loops(
     told, path = tuple(design_texts(design_report(found, say))), Path(target)
     write_design(found, path)
     loops = loops_of(rig, {path: path.read_text(encoding="utf-8")}, estimators, scenarios)
-    checked = recorded_runs(loops, runs, say)
+    checked = recorded_runs(replace(loops, asked=asked.asked if asked else ()), runs, say)
     return Looped(told, checked, drawings(styled_figures(checked)))
