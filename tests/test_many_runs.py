@@ -170,14 +170,13 @@ def test_the_only_run_that_is_lost_is_an_error(lq, monkeypatch):
 
 
 def test_time_outside_the_limits_of_a_specification_is_counted_too(lq):
-    """A step of 120 mm goes faster than 50 mm/s for most of its way, within the plant's margins."""
+    """A step goes faster than 50 mm/s for most of its way; a limit of the plant it hardly meets."""
     asked = read_specification('[limits]\n"slide.velocity" = "50 mm/s"\n', RIG)
     slow, free = (
         check_rig(RIG, lq, ["ekf"], ["step"], spec=spec).found.rows[0] for spec in (asked, None)
     )
 
-    assert free.violation_s == 0.0
-    assert slow.violation_s > 0.5 * slow.rise_s > 0.0
+    assert slow.violation_s - free.violation_s > 0.5 * slow.rise_s > free.violation_s
 
 
 def test_figures_of_a_plant_with_a_bench_come_back_from_their_rows(lq, monkeypatch):
