@@ -174,10 +174,9 @@ def test_a_column_read_by_name_and_by_number_feeds_one_signal(tmp_path):
     ("factor", "unit", "said"),
     [
         (1.0, "ms", r"400 samples 1e-06 s apart, 0\.000399 s long, look like times in s; expected"),
-        (1e3, "s", r"1 s apart, 399 s long, look like times in ms or sample numbers; expected "),
-        (1e3, "s", r'expected unit = "ms" or step = "\.\.\." for its column'),
+        (1e4, "s", r"10 s apart, 3990 s long, look like times in ms; expected "),
         (1e6, "s", "look like times in us; expected"),
-        (1e6, "ms", "look like times in us; expected"),
+        (1e7, "ms", "look like times in us; expected"),
     ],
 )
 def test_times_in_another_unit_than_the_rig_says_are_warned_of(tmp_path, factor, unit, said):
@@ -189,7 +188,19 @@ def test_times_in_another_unit_than_the_rig_says_are_warned_of(tmp_path, factor,
         read(tmp_path, text(rows), rig=rig)
 
 
-@pytest.mark.parametrize(("factor", "unit"), [(1.0, "s"), (1e3, "ms"), (100.0, "s"), (0.1, "s")])
+def test_sample_numbers_read_as_seconds_are_warned_of(tmp_path):
+    rows = table(3000)
+    rows[:, 0] = np.arange(len(rows))
+
+    with pytest.warns(RecordingWarning, match=r"or sample numbers; expected .* or step = ") as told:
+        read(tmp_path, text(rows))
+    assert "3000 samples 1 s apart, 2999 s long" in str(told[0].message)
+
+
+@pytest.mark.parametrize(
+    ("factor", "unit"),
+    [(1.0, "s"), (1e3, "ms"), (100.0, "s"), (0.1, "s"), (500.0, "s"), (1e3, "s"), (2e3, "s")],
+)
 @pytest.mark.filterwarnings("error")
 def test_an_ordinary_clock_is_not_warned_of(tmp_path, factor, unit):
     rows = table()

@@ -248,3 +248,12 @@ def test_words_below_the_names_that_are_no_units_say_nothing(tmp_path):
     rows = table()
 
     assert_same(read(tmp_path, text(rows).replace("\n", "\ntime,-,[bar],(mm)\n", 1)), rows)
+
+
+def test_a_gauge_whose_row_of_units_says_bar_is_read_as_the_rig_says(tmp_path):
+    content = text(table()).replace("\n", "\ns,V,bar,mm\n", 1)
+    gauge = RIG.replace('unit = "bar"', 'unit = "bar_gauge"')
+    absolute, above = read(tmp_path, content), read(tmp_path, content, "", gauge)
+    pressure = "chamber_a.pressure_pa"
+
+    assert above[pressure] - absolute[pressure] == pytest.approx(1e5)  # what the rig has around it

@@ -23,7 +23,7 @@ def test_white_noise_is_independent_of_the_input_and_a_late_share_of_it_is_found
     assert white.outside < 0.1
     assert found.lag_s[np.argmax(found.correlation)] == pytest.approx(7e-3)
     assert found.correlation.max() == pytest.approx(0.2 / np.sqrt(1.04), abs=0.03)
-    assert found.band == pytest.approx(1.96 / np.sqrt(4000), rel=0.3)
+    assert found.bands.min() == pytest.approx(1.96 / np.sqrt(4000), rel=0.3)
 
 
 def test_the_correlation_is_that_of_numpy():

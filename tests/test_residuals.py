@@ -25,7 +25,7 @@ def test_white_noise_is_white_and_has_the_density_of_its_floor():
     found = residual_of(recording_of(white(20_000)), white(20_000), 1.0)
 
     assert found.outside < 0.12
-    assert found.band == pytest.approx(1.96 / np.sqrt(20_000))
+    assert found.bands[0] == pytest.approx(1.96 / np.sqrt(20_000))
     assert np.median(found.density) == pytest.approx(found.floor, rel=0.1)
     assert found.floor == pytest.approx(2.0 * DT)
 

@@ -8,6 +8,7 @@ from workbench.comparison.regimes import regimes
 from workbench.plants import PLANTS
 from workbench.recording import Recording
 from workbench.rig_laws import with_laws
+from workbench.simulation import arriving_at_rest
 
 REST_V, COMMAND, N = 5.25, "valve.command_v", 400
 
@@ -33,6 +34,12 @@ def test_a_valve_is_open_to_the_side_of_where_it_rests():
 
     assert found["valve open above 5.25 V"][N // 2 :].all()
     assert "valve open below 5.25 V" not in found
+
+
+def test_an_offset_that_is_fitted_moves_the_command_at_which_the_valve_rests_not_the_valve():
+    moved = PLANTS["crr_rig"]().with_values({"valve_offset.offset_v": 0.55})
+
+    assert arriving_at_rest(moved) == arriving_at_rest(PLANTS["crr_rig"]()) == {COMMAND: 5.0}
 
 
 LAW, SIZE_KG_S = "law[|u|]@cap", 1e-4

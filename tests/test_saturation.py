@@ -8,11 +8,14 @@ from studies.demo import DATA
 from workbench.comparison.noise import NoiseSource, recorded_noise
 from workbench.consistency import Weight, trusted
 from workbench.fitting.noise import measured_noise
+from workbench.plants.crr_rig import crr_rig
 from workbench.reading import RecordingWarning, read_recording
 from workbench.recording import Recording
 from workbench.rig import load_rig
 from workbench.saturation import saturated
+from workbench.simulation import simulate
 
+COMMAND = "valve.command_v"
 PRESSURE, PLACE, SPEED = "chamber_a.pressure_pa", "slide.position_m", "slide.velocity_m_s"
 SIZE = {PRESSURE: 1e5, PLACE: 0.01, SPEED: 0.1}
 
@@ -42,10 +45,23 @@ def test_a_saturated_sensor_with_a_resolution_finer_than_its_noise_is_seen(resol
     assert np.array_equal(saturated(PLACE, values), values == values.max())
 
 
-def test_a_clipped_pressure_without_noise_is_seen_by_its_slope_at_the_end():
-    values = 1e5 * np.minimum(np.sin(2 * np.pi * 6 * np.arange(6000) / 6000), 0.9)
-
-    assert np.array_equal(saturated(PRESSURE, values), values == values.max())
+@pytest.mark.parametrize("digits", [4, 6, 10])
+@pytest.mark.parametrize(("sample_time_s", "lasts_s"), [(1e-3, 4.0), (1e-2, 4.0), (1e-2, 40.0)])
+@pytest.mark.parametrize("noise_pa", [0.0, 30.0])
+def test_chambers_that_come_to_their_supply_and_to_ambient_are_not_called_saturated(
+    sample_time_s, lasts_s, noise_pa, digits
+):
+    """They creep there, or are there in a sample or two, and leave with full slope."""
+    t = sample_time_s * np.arange(round(lasts_s / sample_time_s))
+    command = np.where(np.sin(np.pi * t) >= 0.0, 8.25, 2.25)
+    record = simulate(crr_rig().lean(), Recording("square", sample_time_s, {COMMAND: command}))
+    rng = np.random.default_rng(4)
+    for name in crr_rig().measured:
+        values = record[name]
+        if name.endswith("pressure_pa"):
+            values = 250.0 * np.round((values + noise_pa * rng.normal(size=len(t))) / 250.0)
+        written = np.array([float(f"{value:.{digits}g}") for value in values])
+        assert not saturated(name, written).any(), name
 
 
 @pytest.mark.parametrize("noise", [0.0, 1e-3])

@@ -2,10 +2,9 @@
 
 A sensor that would read more than it can gives its last value again and again, to the last bit,
 while noise makes every other sample differ from the one before it.  A signal at a natural end may
-stand still as well, where the resolution is coarser than the noise: a piston at its stop, a
-velocity of zero.  So exactness counts only where the noise of the other samples is wide enough to
-move a signal at rest.  A pressure has no natural end that it meets at a slope: one that does is
-clipped, without noise too.
+stand still as well, where the resolution is coarser than the noise or nothing is noisy: a piston at
+its stop, a chamber at its supply.  So exactness counts only where the noise of the other samples is
+wide enough to move a signal at rest.
 """
 
 from __future__ import annotations
@@ -20,12 +19,14 @@ FEWEST = 50  # samples at an end: fewer are chance
 LEAST_SHARE = 0.005  # of the samples
 IN_ROWS = 0.5  # share of them beside another: a peak of a coarse signal has lone ones
 LIVELY = 0.2  # share of unchanged samples below which a channel usually changes
-DITHER = 0.5  # of the resolution: noise from which on no signal at rest stays on one value
-ORDERS = (3, 6)  # differences that must agree on the noise: motion is in the lower ones alone
+DITHER = 0.7  # of the resolution: noise from which on no signal at rest stays on one value
+ORDERS = (3, 6)  # of differences, which agree on noise: motion is in the lower ones alone
+AGREE = 1.3  # times one another
+NOISIEST = 0.03  # of the span: more is motion that is sampled too seldom
 BLOCK = 40  # samples
-QUIET_SHARE = 0.3  # of the blocks
-STEEP = 0.2  # of the usual step between samples: with such a step no pressure comes to rest
-COARSE = 2.5  # resolutions: a smaller step is a slow approach
+FEWEST_BLOCKS, QUIET_SHARE = 10, 0.05  # of fewer none need be quiet; all have the noise
+NEAR_END = 200  # values nearest to an end, whose gaps tell the resolution there
+FINE_SHARE = 0.1  # of the gaps: the smallest may be the last digit of a small number
 
 
 def saturated(name: str, values: np.ndarray) -> np.ndarray:
@@ -36,12 +37,9 @@ def saturated(name: str, values: np.ndarray) -> np.ndarray:
     if not piled:
         return none
     elsewhere = ~np.any(piled, axis=0)
-    if not _lively(values, elsewhere):
-        return none
-    if _dithers(values, elsewhere):
-        return ~elsewhere
-    clipped = [at for at in piled if suffix(name) == "pa" and _met_at_a_slope(values, at)]
-    return np.any(clipped, axis=0) if clipped else none
+    noise = _noise(np.where(elsewhere, values, np.nan)) if _lively(values, elsewhere) else 0.0
+    at_ends = [at for at in piled if noise > DITHER * _resolution(values, values[at][0])]
+    return np.any(at_ends, axis=0) if at_ends else none
 
 
 def _moves(values: np.ndarray) -> bool:
@@ -66,47 +64,43 @@ def _lively(values: np.ndarray, elsewhere: np.ndarray) -> bool:
     return len(same) >= FEWEST and float(same.mean()) <= LIVELY
 
 
-def _dithers(values: np.ndarray, elsewhere: np.ndarray) -> bool:
-    """Whether the noise of the other samples is wide enough to move a signal at rest."""
-    return _noise(np.where(elsewhere, values, np.nan)) > DITHER * _resolution(values)
-
-
 def _noise(values: np.ndarray) -> float:
-    """Noise where a signal is quiet, from differences of every order; the least of them.
+    """Noise where a signal is quiet, from differences of several orders; 0 where they disagree.
 
     White noise of variance s^2 gives differences of order k the variance C(2k, k) s^2.
     """
-    return min(_from_differences(values, order) for order in ORDERS)
+    found = [_from_differences(values, order) for order in ORDERS]
+    most = min(AGREE * min(found), NOISIEST * float(np.ptp(values[np.isfinite(values)])))
+    return min(found) if max(found) < most else 0.0
 
 
 def _from_differences(values: np.ndarray, order: int) -> float:
     differences = np.diff(values, order)
     differences = differences[np.isfinite(differences)]
     count = len(differences) // BLOCK
-    if not count:
+    if count < FEWEST_BLOCKS:
         return 0.0
     blocks = differences[: count * BLOCK].reshape(count, BLOCK)
     spread = np.sqrt(np.mean(blocks**2, axis=1) / comb(2 * order, order))
     return float(np.quantile(spread, QUIET_SHARE))
 
 
-def _resolution(values: np.ndarray) -> float:
-    """The smallest difference between two values."""
-    gaps = np.diff(np.unique(values[np.isfinite(values)]))
-    gaps = gaps[gaps > 1e-9 * gaps.sum()]
-    return float(gaps.min()) if len(gaps) else 0.0
+def _resolution(values: np.ndarray, end: float) -> float:
+    """A small gap between two values near an end, anywhere, or where it is quiet: the largest.
 
-
-def _met_at_a_slope(values: np.ndarray, at: np.ndarray) -> bool:
-    """Whether a signal comes to its end, and leaves it, with the steps of a signal in motion.
-
-    The steps beside those at the edges count: at an edge the end cuts the step short.
+    Numbers of so many digits have one that grows with them.
     """
-    steps = np.abs(np.diff(values))
-    edges = at[1:] != at[:-1]
-    outside = ~at[1:] & ~at[:-1] & (steps > 0.0)
-    beside = np.append(edges[1:], False) | np.append(False, edges[:-1])
-    if not (outside & beside).any():
-        return False
-    least = max(STEEP * float(np.median(steps[outside])), COARSE * _resolution(values))
-    return float(np.median(steps[outside & beside])) > least
+    levels = np.unique(values[np.isfinite(values)])
+    near = levels[:NEAR_END] if end == levels[0] else levels[-NEAR_END:]
+    gaps = [float(np.quantile(np.diff(each), FINE_SHARE)) for each in (near, levels)]
+    return max(*gaps, _smallest_step(values))
+
+
+def _smallest_step(values: np.ndarray) -> float:
+    """Of third differences, multiples of the resolution without motion, in a quiet block."""
+    steps = np.abs(np.diff(values, 3))
+    steps = steps[steps > 1e-9 * np.ptp(values[np.isfinite(values)])]
+    count = len(steps) // BLOCK
+    if not count:
+        return 0.0
+    return float(np.quantile(steps[: count * BLOCK].reshape(count, BLOCK).min(axis=1), QUIET_SHARE))

@@ -54,13 +54,17 @@ def _arrived(
 
 
 def arriving_at_rest(plant: Plant) -> dict[str, float]:
-    """Each command as it arrives, behind all that alters it, where the plant rests.
+    """Each command as it arrives, behind all that alters it, where its valve is at its centre.
 
-    That is what the valve itself rests at: a valve offset by 0.25 V rests at 5.25 V of its command.
+    That of the valve itself where it has one, whatever offset has been fitted before it; else what
+    arrives of the command at which the plant rests.
     """
     names = [signal.name for signal in plant.commands]
     found = plant.model.quantities(*names)(plant.initial, *plant.nominal).full().ravel()
-    return dict(zip(names, found.tolist(), strict=True))
+    members = {member.name: member for member in plant.members}
+    valves = (members.get(name.rpartition(".")[0]) for name in names)
+    centres = (getattr(valve, "centre_v", rest) for valve, rest in zip(valves, found, strict=True))
+    return {name: float(centre) for name, centre in zip(names, centres, strict=True)}
 
 
 def command_delay_s(plant: Plant) -> float:

@@ -198,6 +198,8 @@ def _image_cells(axes: Axes, image: AxesImage) -> Iterator[tuple[str, list, list
         bottom, top = top, bottom
     over, beside = _words(axes.xaxis), _words(axes.yaxis)
     rows, columns = values.shape[:2]
+    if values.ndim != 2:  # a picture
+        return
     for row, column in zip(*np.nonzero(~np.ma.getmaskarray(values)), strict=True):
         x = left + (column + 0.5) * (right - left) / columns
         y = top + (row + 0.5) * (bottom - top) / rows

@@ -36,11 +36,6 @@ class Independence:
     bands: np.ndarray
 
     @property
-    def band(self) -> float:
-        """Half width of the band where no pair is missing; NaN where nothing is known."""
-        return float(np.min(self.bands)) if len(self.bands) else float("nan")
-
-    @property
     def outside(self) -> float:
         """Share of the lags from 0 on outside the band; 0.05 is chance.  NaN without any."""
         causal = (np.abs(self.correlation) > self.bands)[self.lag_s >= 0.0]

@@ -48,11 +48,6 @@ class Residual:
     floor: float
 
     @property
-    def band(self) -> float:
-        """Half width of the band for as many pairs as samples; NaN where nothing is known."""
-        return float(self.bands[0]) if len(self.bands) else float("nan")
-
-    @property
     def outside(self) -> float:
         """Share of the lags outside the band; 0.05 is chance.  NaN where nothing is known."""
         beyond = np.abs(self.correlation[1:]) > self.bands[1:]

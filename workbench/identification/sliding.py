@@ -68,7 +68,7 @@ class Motion:
     def friction_n(self, forward: bool, mean_samples: int = 1) -> np.ndarray:
         """What friction holds against at rest or at constant speed, (n,), positive that way."""
         pushing_n = self.pushing_n if forward else -self.pushing_n
-        return averaged(pushing_n - self.pressed_n, mean_samples)
+        return _averaged(pushing_n - self.pressed_n, mean_samples)
 
 
 def motion(plant: Plant, friction: StribeckFriction, recording: Recording) -> Motion:
@@ -106,7 +106,7 @@ def _received(plant: Plant, kind: str, body: str, but: str = "") -> Iterator[Exp
 def steady_run(moved: Motion) -> SteadyRun | None:
     """The longest stretch of steady speed, if it is long enough."""
     width = max(round(SMOOTHING_S / moved.sample_time_s), 1)
-    speed = averaged(moved.velocity_m_s, width)
+    speed = _averaged(moved.velocity_m_s, width)
     fast = np.abs(speed) > 0.5 * np.quantile(np.abs(speed), 0.95)
     usual = float(np.median(speed[fast])) if fast.any() else 0.0
     first, last = _longest(np.abs(speed - usual) < STEADY * abs(usual))
@@ -131,7 +131,7 @@ def break_aways(moved: Motion) -> tuple[BreakAway, ...]:
     """
     dt, speed = moved.sample_time_s, np.abs(moved.velocity_m_s)
     rest = round(LEAST_REST_S / dt)
-    rested = np.flatnonzero(averaged(1.0 * (speed < RESTING_M_S), rest) > 0.95)
+    rested = np.flatnonzero(_averaged(1.0 * (speed < RESTING_M_S), rest) > 0.95)
     starts = np.flatnonzero((speed[1:] > MOVING_M_S) & (speed[:-1] <= MOVING_M_S)) + 1
     found, last = [], 0
     for start in starts:
@@ -146,7 +146,7 @@ def break_aways(moved: Motion) -> tuple[BreakAway, ...]:
     return tuple(found)
 
 
-def averaged(values: np.ndarray, width: int) -> np.ndarray:
+def _averaged(values: np.ndarray, width: int) -> np.ndarray:
     """Moving mean, shorter at the ends."""
     window = np.ones(min(width, len(values)))
     count = np.convolve(np.ones(len(values)), window, mode="same")

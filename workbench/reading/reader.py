@@ -22,6 +22,8 @@ from workbench.recording_format import derived_channels
 from workbench.rig import Rig
 from workbench.units import UnitError, public_name, scale
 
+GAUGE = "_gauge"
+
 
 def read_recording(rig: Rig, path: Path | str) -> Recording:
     """The channels of a file in SI units, by full name, on one uniform time grid.
@@ -128,14 +130,18 @@ def _shared(table: Table, columns: dict[str, int]) -> list[Message]:
 
 
 def _require_units(rig: Rig, table: Table, columns: dict[str, int]) -> None:
-    """Refuse a row of units that says another one than the rig; what is no unit says nothing."""
+    """Refuse a row of units that says another one than the rig; what is no unit says nothing.
+
+    A logger writes bar for a gauge too: only one that says gauge contradicts an absolute pressure.
+    """
     wrong = []
     for name, number in columns.items():
         told = table.units[number] if number < len(table.units) else ""
         unit = rig.reader.time.unit if name == "time" else rig.reader.channels[name].unit
         quantity = "time_s" if name == "time" else name
         with suppress(UnitError):
-            if told and scale(told, quantity) != scale(unit, quantity):
+            own = unit if told.endswith(GAUGE) else unit.removesuffix(GAUGE)
+            if told and scale(told, quantity) != scale(own, quantity):
                 what = f"the row of units says {told}, the rig {unit or 'none'}"
                 expected = (
                     f"unit = '{told}' in the rig's [recording], or {unit or 'none'} in the file"
