@@ -240,8 +240,10 @@ def test_a_reference_is_met_at_the_time_of_the_estimate(plant, ahead_s, first):
     "late",
     [
         {"command_delay.delay_s": 5e-3},
-        {"command_delay.delay_s": 3.5e-3},
-        {"line_delay.length_m": 1.5, "line_delay.diameter_m": 0.02},
+        pytest.param({"command_delay.delay_s": 3.5e-3}, marks=pytest.mark.slow),
+        pytest.param(
+            {"line_delay.length_m": 1.5, "line_delay.diameter_m": 0.02}, marks=pytest.mark.slow
+        ),
     ],
     ids=["network", "between samples", "tube"],
 )

@@ -277,7 +277,7 @@ def test_the_commands_design_and_check_a_gearbox(tmp_path):
     assert "leave --estimator out" in answer.stderr
 
 
-@pytest.mark.parametrize("scenario", ["h-n", "l-n"])
+@pytest.mark.parametrize("scenario", [pytest.param("h-n", marks=pytest.mark.slow), "l-n"])
 def test_shifts_to_neutral_are_made_behind_a_network_that_is_known(scenario):
     """3 ms late, the piston would go 2.6 mm past Neutral and land with 1.1 m/s and more."""
     late = {f"command_delay@valve_{k}.delay_s": 3e-3 for k in (1, 2)}
