@@ -9,10 +9,9 @@ wide enough to move a signal at rest.
 
 from __future__ import annotations
 
-from math import comb
-
 import numpy as np
 
+from workbench.quiet_blocks import block_deviations, in_blocks
 from workbench.units import suffix
 
 FEWEST = 50  # samples at an end: fewer are chance
@@ -23,7 +22,6 @@ DITHER = 0.7  # of the resolution: noise from which on no signal at rest stays o
 ORDERS = (3, 6)  # of differences, which agree on noise: motion is in the lower ones alone
 AGREE = 1.3  # times one another
 NOISIEST = 0.03  # of the span: more is motion that is sampled too seldom
-BLOCK = 40  # samples
 FEWEST_BLOCKS, QUIET_SHARE = 10, 0.05  # of fewer none need be quiet; all have the noise
 NEAR_END = 200  # values nearest to an end, whose gaps tell the resolution there
 FINE_SHARE = 0.1  # of the gaps: the smallest may be the last digit of a small number
@@ -65,24 +63,15 @@ def _lively(values: np.ndarray, elsewhere: np.ndarray) -> bool:
 
 
 def _noise(values: np.ndarray) -> float:
-    """Noise where a signal is quiet, from differences of several orders; 0 where they disagree.
-
-    White noise of variance s^2 gives differences of order k the variance C(2k, k) s^2.
-    """
-    found = [_from_differences(values, order) for order in ORDERS]
+    """Noise where a signal is quiet, from differences of several orders; 0 where they disagree."""
+    found = [_quiet(block_deviations(values, order)) for order in ORDERS]
     most = min(AGREE * min(found), NOISIEST * float(np.ptp(values[np.isfinite(values)])))
     return min(found) if max(found) < most else 0.0
 
 
-def _from_differences(values: np.ndarray, order: int) -> float:
-    differences = np.diff(values, order)
-    differences = differences[np.isfinite(differences)]
-    count = len(differences) // BLOCK
-    if count < FEWEST_BLOCKS:
-        return 0.0
-    blocks = differences[: count * BLOCK].reshape(count, BLOCK)
-    spread = np.sqrt(np.mean(blocks**2, axis=1) / comb(2 * order, order))
-    return float(np.quantile(spread, QUIET_SHARE))
+def _quiet(spread: np.ndarray) -> float:
+    """What all blocks have; 0 of so few that none need be quiet."""
+    return float(np.quantile(spread, QUIET_SHARE)) if len(spread) >= FEWEST_BLOCKS else 0.0
 
 
 def _resolution(values: np.ndarray, end: float) -> float:
@@ -99,8 +88,5 @@ def _resolution(values: np.ndarray, end: float) -> float:
 def _smallest_step(values: np.ndarray) -> float:
     """Of third differences, multiples of the resolution without motion, in a quiet block."""
     steps = np.abs(np.diff(values, 3))
-    steps = steps[steps > 1e-9 * np.ptp(values[np.isfinite(values)])]
-    count = len(steps) // BLOCK
-    if not count:
-        return 0.0
-    return float(np.quantile(steps[: count * BLOCK].reshape(count, BLOCK).min(axis=1), QUIET_SHARE))
+    blocks = in_blocks(steps[steps > 1e-9 * np.ptp(values[np.isfinite(values)])])
+    return float(np.quantile(blocks.min(axis=1), QUIET_SHARE)) if len(blocks) else 0.0

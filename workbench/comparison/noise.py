@@ -14,11 +14,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from enum import Enum
-from math import comb
 
 import numpy as np
 
-from workbench.fitting.noise import BLOCK, NoNoiseError, measured_noise
+from workbench.fitting.noise import NoNoiseError, measured_noise
+from workbench.quiet_blocks import BLOCK, deviations
 from workbench.recording import Recording
 from workbench.saturation import saturated
 from workbench.units import public_name
@@ -92,7 +92,7 @@ def _source(recording: Recording, name: str, noise: float) -> NoiseSource:
     spread = blocks.std(axis=1)
     if np.mean(spread < STILL_SPREAD * noise) > STILL_SHARE:
         return NoiseSource.STILL
-    low, high = (_from_differences(blocks, order) for order in (3, 6))
+    low, high = (deviations(np.diff(blocks, order, axis=1), order) for order in (3, 6))
     quiet = low <= np.quantile(low, 0.3)
     same = np.median(low[quiet]) < SAME_NOISE * np.median(high[quiet])
     return NoiseSource.MOVING if same else NoiseSource.UNCLEAR
@@ -108,12 +108,3 @@ def _blocks(recording: Recording, name: str) -> np.ndarray:
         cut = piece[name][: count * BLOCK].reshape(count, BLOCK)
         found.append(cut[np.isfinite(cut).all(axis=1)])
     return np.concatenate(found)
-
-
-def _from_differences(blocks: np.ndarray, order: int) -> np.ndarray:
-    """Noise of each block from its differences of one order, shape (n_blocks,).
-
-    White noise of variance s^2 gives differences of order k the variance C(2k, k) s^2.
-    """
-    differences = np.diff(blocks, order, axis=1)
-    return np.sqrt(np.mean(differences**2, axis=1) / comb(2 * order, order))

@@ -6,10 +6,10 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from workbench.quiet_blocks import block_deviations
 from workbench.recording import Recording
 from workbench.saturation import saturated
 
-BLOCK = 40  # samples
 QUIET_SHARE = 0.3  # this share of the blocks is taken for still
 ALIKE = 1.7  # times their level: three deviations of one block above what all have
 THIRD_DIFFERENCE_GAIN = 20.0  # variance of y3 - 3 y2 + 3 y1 - y0 over that of y
@@ -58,13 +58,7 @@ def _block_deviations(channel: str, values: np.ndarray) -> np.ndarray:
     No difference reaches over a saturated sample: its neighbours are far apart.
     """
     kept = np.where(saturated(channel, values), np.nan, values)
-    differences = np.diff(kept[np.isfinite(values)], 3)
-    differences = differences[np.isfinite(differences)]
-    count = len(differences) // BLOCK
-    if count < 1:
-        return np.array([])
-    differences = differences[: count * BLOCK].reshape(count, BLOCK)
-    return np.sqrt(np.mean(differences**2, axis=1) / THIRD_DIFFERENCE_GAIN)
+    return block_deviations(kept[np.isfinite(values)], 3)
 
 
 def _level(spread: np.ndarray) -> float:
