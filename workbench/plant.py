@@ -246,7 +246,7 @@ def require(names: Iterable[str], known: Iterable[str], owner: str) -> None:
     UnknownNameError
         Naming the first unknown name, the nearest known one and all known ones.
     """
-    known = list(known)
+    known = dict.fromkeys(known)  # in their order, and quickly asked
     for name in names:
         if name not in known:
             near = nearest(name, known)

@@ -47,7 +47,7 @@ class Metric:
         flat = residuals.transpose(2, 1, 3, 0).reshape(n_w, n_y * length, n)
         away = self.at.residual[:, n_y * length :, None]
         full = np.concatenate([flat, np.repeat(away, n, axis=2)], axis=1)
-        return self.at.projected(full).transpose(2, 0, 1)
+        return np.ascontiguousarray(self.at.projected(full).transpose(2, 0, 1))  # read many times
 
     def explained(self, row: np.ndarray) -> tuple[float, np.ndarray]:
         """(cost, linear step of the scaled unknowns) for projected rows (n_windows, rows)."""

@@ -6,6 +6,7 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
+from workbench.effect import Effect
 from workbench.effects.timing import sent_at_s
 from workbench.fitting.starts import guessed_states
 from workbench.plant import Plant
@@ -46,6 +47,16 @@ def cut_rows(rows: np.ndarray, firsts: tuple[int, ...], length: int) -> np.ndarr
         if firsts
         else np.zeros((rows.shape[0], 0, length))
     )
+
+
+def in_time(effect: Effect) -> bool:
+    """True for a cause that acts on the sampled commands: delay, pause."""
+    return type(effect).resample is not Effect.resample
+
+
+def causes_in_time(plant: Plant) -> tuple[Effect, ...]:
+    """Those that are there, with their values."""
+    return tuple(each for each in plant.effects if in_time(each) and not each.absent)
 
 
 def cut_inputs(

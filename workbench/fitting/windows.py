@@ -21,9 +21,11 @@ from workbench.effect import Effect
 from workbench.fitting.error_model import OUTLYING, ErrorModel, error_model
 from workbench.fitting.window_cuts import (
     begun_s,
+    causes_in_time,
     cut_inputs,
     cut_rows,
     evenly,
+    in_time,
     received_windows,
     thinned,
     window_firsts,
@@ -176,8 +178,7 @@ class Windows:
         if not plants:
             return np.zeros((0, *self.measured.shape))
         starts = np.broadcast_to(starts, (len(plants), *self.start.shape))
-        fed = [self._inputs(plant) for plant in plants]
-        u, d = (np.hstack([each[k] for each in fed]) for k in (0, 1))
+        u, d = map(np.hstack, zip(*self._inputs_of(plants), strict=True))
         p = np.hstack([np.tile(plant.nominal[2][:, None], len(self)) for plant in plants])
         x0 = np.hstack(list(starts)) if starts.shape[1] else np.zeros((0, p.shape[1]))
         y = self._runs.outputs(x0, u, d, p)
@@ -210,16 +211,26 @@ class Windows:
         """All but what runs them, which is built again: a model does not travel."""
         return {key: value for key, value in self.__dict__.items() if key != "_runs"}
 
+    def _inputs_of(self, plants: Iterable[Plant]) -> list[tuple[np.ndarray, np.ndarray]]:
+        """:meth:`_inputs` of each plant; those with the same causes in time share theirs."""
+        found: dict[tuple[Effect, ...], tuple[np.ndarray, np.ndarray]] = {}
+        keys = []
+        for plant in plants:
+            keys.append(causes_in_time(plant))
+            if keys[-1] not in found:
+                found[keys[-1]] = self._inputs(plant)
+        return [found[key] for key in keys]
+
     def _inputs(self, plant: Plant) -> tuple[np.ndarray, np.ndarray]:
         """Commands and measured inputs of all windows side by side, (n_u, n L) and (n_d, n L)."""
-        if any(_in_time(effect) and not effect.absent for effect in plant.effects):
+        if causes_in_time(plant):
             return cut_inputs(plant, self.recordings, self.firsts, self.length)
         return self._plain_inputs
 
     @cached_property
     def _plain_inputs(self) -> tuple[np.ndarray, np.ndarray]:
         """Those of a plant without any cause in time."""
-        effects = tuple(effect for effect in self.plant.effects if not _in_time(effect))
+        effects = tuple(effect for effect in self.plant.effects if not in_time(effect))
         plain = replace(self.plant, effects=effects)
         return cut_inputs(plain, self.recordings, self.firsts, self.length)
 
@@ -228,11 +239,6 @@ def position_alone(plant: Plant) -> bool:
     """True for a plant that moves, of which nothing but positions is recorded."""
     ends = ("position_m", "angle_rad")
     return bool(plant.state_list) and all(name.endswith(ends) for name in plant.measured)
-
-
-def _in_time(effect: Effect) -> bool:
-    """True for a cause that acts on the sampled commands: delay, pause."""
-    return type(effect).resample is not Effect.resample
 
 
 def cut_windows(
