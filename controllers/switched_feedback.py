@@ -16,12 +16,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from controllers.lq import dlqr
 from controllers.shift_prediction import drives
-from controllers.unseen import HELD_S
+from controllers.unseen import waiting
 from linearize.discrete import sampled
 from linearize.modes import HybridModel
 from linearize.shift_modes import valve_flows
@@ -44,13 +45,25 @@ class SwitchedMemory:
     sent        commands as integers, newest lowest
     phase       sample within the period
     shares      of the period
-    unseen      samples since the last finite estimate
     """
 
     sent: tuple[int, int] = (0, 0)
     phase: int = 0
     shares: tuple[float, float] = (0.0, 0.0)
-    unseen: int = 0
+
+
+def _switched(sent: tuple[int, int], wanted: list[int]) -> tuple[np.ndarray, tuple[int, int]]:
+    """What is sent of what is wanted, (2,), no valve sooner than it may; and all that was sent."""
+    pairs = zip(sent, wanted, strict=True)
+    on = [u if age(s) >= HOLD else s & 1 for s, u in pairs]
+    first, second = ((s << 1 | u) & MASK for s, u in zip(sent, on, strict=True))
+    return np.array(on, dtype=float), (first, second)
+
+
+def _held_or_shut(wanted: np.ndarray, memory: SwitchedMemory) -> tuple[np.ndarray, SwitchedMemory]:
+    """What is sent while nobody knows where the piston is; a period goes on afterwards."""
+    on, sent = _switched(memory.sent, wanted.astype(int).tolist())
+    return on, replace(memory, sent=sent)
 
 
 @dataclass(frozen=True)
@@ -71,10 +84,9 @@ class SwitchedFeedback:
     def start(self) -> Command:
         return Command(np.zeros(2), SwitchedMemory())
 
+    @partial(waiting, sent=_held_or_shut)
     def step(self, last: Command, reference: np.ndarray, estimate: Estimate) -> Command:
         x, memory = estimate.pick(STATES), last.memory
-        if not np.isfinite(x).all():
-            return self._blind(memory)
         place_m = min(self.targets, key=lambda m: abs(m - reference[0, 0]))
         wanted, held = self.targets[place_m]
         shares = held - self.gains[int(x[2] > 0.0)] @ (x - wanted)
@@ -88,21 +100,6 @@ class SwitchedFeedback:
         on, sent = _switched(memory.sent, [int(share > level) for share in shares])
         phase = (memory.phase + 1) % self.period if self.period else 0
         return Command(on, SwitchedMemory(sent, phase, tuple(map(float, shares))))
-
-    def _blind(self, memory: SwitchedMemory) -> Command:
-        """What is sent while nobody knows where the piston is; a period goes on afterwards."""
-        unseen = memory.unseen + 1
-        holds = unseen * self.sample_time_s <= HELD_S
-        on, sent = _switched(memory.sent, [s & 1 if holds else 0 for s in memory.sent])
-        return Command(on, replace(memory, sent=sent, unseen=unseen), {"fallback": 1.0})
-
-
-def _switched(sent: tuple[int, int], wanted: list[int]) -> tuple[np.ndarray, tuple[int, int]]:
-    """What is sent of what is wanted, (2,), no valve sooner than it may; and all that was sent."""
-    pairs = zip(sent, wanted, strict=True)
-    on = [u if age(s) >= HOLD else s & 1 for s, u in pairs]
-    first, second = ((s << 1 | u) & MASK for s, u in zip(sent, on, strict=True))
-    return np.array(on, dtype=float), (first, second)
 
 
 def switched_pd(hybrid: HybridModel) -> SwitchedFeedback:

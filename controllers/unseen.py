@@ -3,6 +3,7 @@
 A few missing samples are bridged by what was sent; for longer nobody knows where an open valve
 leads to.  What the controller remembers is kept as it was, so the loop goes on from there.  Only
 what a step reads counts: a position controller does not miss a pressure that it never asks for.
+Valves that may not switch at any moment send what they may of this, and remember it.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from workbench.contracts import Command, Controller, Estimate
 HELD_S = 0.02  # at 0.5 m/s a piston moves 10 mm in it
 
 Step = Callable[[Any, Command, np.ndarray, Estimate], Command]
+Sent = Callable[[np.ndarray, Any], tuple[np.ndarray, Any]]
 
 
 class UnseenError(ValueError):
@@ -52,8 +54,16 @@ class Watched(Estimate):
         return found
 
 
-def waiting(step: Step) -> Step:
-    """The step of a controller, which waits where the estimate is not finite: see the module."""
+def as_wanted(wanted: np.ndarray, memory: Any) -> tuple[np.ndarray, Any]:
+    """The command of a valve that follows at once, and the memory as it was."""
+    return wanted, memory
+
+
+def waiting(step: Step, sent: Sent = as_wanted) -> Step:
+    """The step of a controller, which waits where the estimate is not finite: see the module.
+
+    ``sent`` makes of a wanted command and a memory what is really sent, and the memory after it.
+    """
 
     @wraps(step)
     def waits(self: Controller, last: Command, reference: np.ndarray, seen: Estimate) -> Command:
@@ -67,9 +77,9 @@ def waiting(step: Step) -> Step:
         try:
             return step(self, before, reference, Watched(**vars(seen)))
         except UnseenError:
-            longer = Unseen(waited.memory, waited.samples + 1)
-            holds = longer.samples * self.sample_time_s <= HELD_S
-            value = last.value if holds else self.start().value
-            return Command(value, longer, {"fallback": 1.0})
+            samples = waited.samples + 1
+            holds = samples * self.sample_time_s <= HELD_S
+            value, memory = sent(last.value if holds else self.start().value, waited.memory)
+            return Command(value, Unseen(memory, samples), {"fallback": 1.0})
 
     return waits

@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 
-from controllers.switched_feedback import HOLD, averaged, switched_lq, switched_pd
+from controllers.switched_feedback import (
+    HOLD,
+    SwitchedMemory,
+    averaged,
+    switched_lq,
+    switched_pd,
+)
 from controllers.unseen import HELD_S
 from linearize.shifting import STATES
 from linearize.standard import shift_modes
@@ -84,9 +90,9 @@ def test_without_an_estimate_the_last_command_holds_and_then_both_valves_are_shu
 
     assert (np.array(rows[:held]) == rows[0]).all() and rows[0].any()
     assert not np.any(rows[held:])
-    assert command.memory.phase == phase
+    assert command.memory.memory.phase == phase
     again = made.step(command, TO_HIGH, seen([AIR, AIR, -12e-3, 0.0]))
-    assert "fallback" not in again.notes and again.memory.unseen == 0
+    assert "fallback" not in again.notes and isinstance(again.memory, SwitchedMemory)
 
 
 def test_a_valve_keeps_its_least_time_where_the_estimate_comes_and_goes(designs):
