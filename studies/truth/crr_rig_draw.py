@@ -4,15 +4,24 @@ Source: physics.md 2.1 (nominal values), 6 (effects); sizes are typical ones of 
 """
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
-from studies.truth.case import Case, Difference, Hidden, generator
+from studies.truth.case import (
+    Case,
+    Difference,
+    Hidden,
+    differences_of,
+    drawn_size,
+    generator,
+    require_known,
+    true_fields,
+)
 from studies.truth.crr_rig import CrrRig
 
 PLANT = "crr_rig"
 NOMINAL = CrrRig()
-TANK_M3 = 1e-3
 
 EFFECTS = {
     "valve_dead_zone": Hidden(("dead_zone_half_width_v",), 0.6),
@@ -28,7 +37,7 @@ EFFECTS = {
 }
 OUTSIDE_CATALOGUE = ("quadratic_drag",)
 HIDDEN = tuple(name for name in EFFECTS if name not in OUTSIDE_CATALOGUE)
-SMALLEST_SHARE, LARGEST_SHARE = 0.10, 0.60
+draw_size = partial(drawn_size, EFFECTS, OUTSIDE_CATALOGUE)
 STANDARD_DEVIATIONS = {
     **{
         name: 0.05 * getattr(NOMINAL, name)
@@ -56,19 +65,10 @@ def draw(hidden: str | None, seed: int) -> Case:
 
     Raises KeyError for an unknown effect.
     """
-    if hidden is not None and hidden not in EFFECTS:
-        raise KeyError(f"truth: {hidden} is not a hidden effect; there are {', '.join(EFFECTS)}")
+    require_known(hidden, EFFECTS)
     rng = generator(hidden, seed, f"{PLANT} draw")
     size, differences = draw_size(hidden, rng), _differences(hidden, rng)
     return Case(hidden, seed, size, differences, _accessories(rng), plant=PLANT)
-
-
-def draw_size(hidden: str | None, rng: np.random.Generator) -> float:
-    """Log-uniform in 10..60 % of typical; a law outside the catalogue gets the upper half."""
-    if hidden is None:
-        return 0.0
-    low = 0.30 if hidden in OUTSIDE_CATALOGUE else SMALLEST_SHARE
-    return EFFECTS[hidden].drawn_size(low, LARGEST_SHARE, rng)
 
 
 def _differences(hidden: str | None, rng: np.random.Generator) -> tuple[Difference, ...]:
@@ -84,8 +84,7 @@ def _differences(hidden: str | None, rng: np.random.Generator) -> tuple[Differen
     change["friction_wave"] = rng.uniform(0.05, 0.10)
     change["pressure_lag_s"] = rng.uniform(1e-3, 2e-3)
     change["smoothing_share"] = rng.uniform(0.5, 1.0)
-    own = EFFECTS[hidden].fields if hidden else ()
-    return tuple(Difference(f, float(x)) for f, x in change.items() if f not in own)
+    return differences_of(change, EFFECTS, hidden)
 
 
 def _accessories(rng: np.random.Generator) -> tuple[tuple[str, float], ...]:
@@ -99,17 +98,4 @@ def _accessories(rng: np.random.Generator) -> tuple[tuple[str, float], ...]:
 
 def rig_of(case: Case, without: str = "") -> CrrRig:
     """The true rig; `without` names a field whose difference is off, or "hidden"."""
-    changes = dict(case.accessories)
-    for difference in case.differences:
-        if difference.field != without:
-            changes[difference.field] = getattr(NOMINAL, difference.field) + difference.change
-    if case.hidden:
-        size = 0.0 if without == "hidden" else case.size
-        changes.update(_hidden_fields(case.hidden, size))
-    return replace(NOMINAL, **changes)
-
-
-def _hidden_fields(hidden: str, size: float) -> dict[str, float]:
-    if hidden == "supply_droop":  # no droop is an infinite tank; a resistance of 0 divides
-        return {"supply_resistance_pa_s_kg": size, "tank_per_m3": 1 / TANK_M3} if size else {}
-    return {field: size for field in EFFECTS[hidden].fields}
+    return replace(NOMINAL, **true_fields(case, NOMINAL, EFFECTS, without))

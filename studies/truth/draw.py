@@ -7,11 +7,21 @@ from dataclasses import replace
 
 import numpy as np
 
-from studies.truth.case import Case, Difference, Hidden, generator
+from studies.truth.case import (
+    SMALLEST_SHARE,
+    Case,
+    Difference,
+    Hidden,
+    differences_of,
+    drawn_size,
+    generator,
+    hidden_fields,
+    require_known,
+    true_fields,
+)
 from studies.truth.drive import Drive
 
 NOMINAL = Drive()
-TANK_M3 = 1e-3
 
 
 EFFECTS = {
@@ -54,7 +64,6 @@ AT_A_SPOT = ("sticky_spot", "magnetic_catch")
 OUTSIDE_CATALOGUE = ("quadratic_drag", "sagging_cable", *AT_A_SPOT, "sliding_leak", "purge_flow")
 HIDDEN = tuple(name for name in EFFECTS if name not in OUTSIDE_CATALOGUE)
 FIRST = HIDDEN[:12]  # those of the first test bench, which drew nothing below 15 %
-LARGEST_SHARE = 0.60
 
 
 def draw(hidden: str | None, seed: int) -> Case:
@@ -62,19 +71,16 @@ def draw(hidden: str | None, seed: int) -> Case:
 
     Raises KeyError for an unknown effect.
     """
-    if hidden is not None and hidden not in EFFECTS:
-        raise KeyError(f"truth: {hidden} is not a hidden effect; there are {', '.join(EFFECTS)}")
+    require_known(hidden, EFFECTS)
     rng = generator(hidden, seed, "draw")
     size, differences = draw_size(hidden, rng), _differences(hidden, rng)
     return Case(hidden, seed, size, differences, _accessories(hidden, rng))
 
 
 def draw_size(hidden: str | None, rng: np.random.Generator) -> float:
-    """Log-uniform in 10..60 % of typical; a law outside the catalogue gets the upper half."""
-    if hidden is None:
-        return 0.0
-    low = 0.30 if hidden in OUTSIDE_CATALOGUE else 0.15 if hidden in FIRST else 0.10
-    return EFFECTS[hidden].drawn_size(low, LARGEST_SHARE, rng)
+    """As that of every plant, but an effect of the first test bench gets at least 15 %."""
+    smallest = 0.15 if hidden in FIRST else SMALLEST_SHARE
+    return drawn_size(EFFECTS, OUTSIDE_CATALOGUE, hidden, rng, smallest)
 
 
 def _differences(hidden: str | None, rng: np.random.Generator) -> tuple[Difference, ...]:
@@ -106,8 +112,7 @@ def _differences(hidden: str | None, rng: np.random.Generator) -> tuple[Differen
     change["friction_wave"] = rng.uniform(0.05, 0.10)
     change["pressure_lag_s"] = rng.uniform(1e-3, 2e-3)
     change["presliding_share"] = -rng.uniform(0.2, 0.4)
-    own = EFFECTS[hidden].fields if hidden else ()
-    return tuple(Difference(f, float(c)) for f, c in change.items() if f not in own)
+    return differences_of(change, EFFECTS, hidden)
 
 
 def _accessories(hidden: str | None, rng: np.random.Generator) -> tuple[tuple[str, float], ...]:
@@ -133,19 +138,9 @@ def drive_of(
 
     `differences` stand in place of the case's own; `beside` is a case whose hidden effect acts too.
     """
-    changes = dict(case.accessories)
-    for difference in case.differences if differences is None else differences:
-        if difference.field != without:
-            changes[difference.field] = getattr(NOMINAL, difference.field) + difference.change
-    if case.hidden:
-        size = 0.0 if without == "hidden" else case.size
-        changes.update(_hidden_fields(case.hidden, size))
+    if differences is not None:
+        case = replace(case, differences=differences)
+    changes = true_fields(case, NOMINAL, EFFECTS, without)
     if beside is not None and beside.hidden:
-        changes.update(_hidden_fields(beside.hidden, beside.size))
+        changes.update(hidden_fields(EFFECTS, beside.hidden, beside.size))
     return replace(NOMINAL, **changes)
-
-
-def _hidden_fields(hidden: str, size: float) -> dict[str, float]:
-    if hidden == "supply_droop":  # no droop is an infinite tank; a resistance of 0 divides
-        return {"supply_resistance_pa_s_kg": size, "tank_per_m3": 1 / TANK_M3} if size else {}
-    return {field: size for field in EFFECTS[hidden].fields}

@@ -4,10 +4,20 @@ Source: physics.md 2.5 (nominal values), 6 (effects, and their ranges).
 """
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
-from studies.truth.case import Case, Difference, Hidden, generator
+from studies.truth.case import (
+    Case,
+    Difference,
+    Hidden,
+    differences_of,
+    drawn_size,
+    generator,
+    require_known,
+    true_fields,
+)
 from studies.truth.gearbox import Gearbox
 
 PLANT = "gearbox"
@@ -23,7 +33,7 @@ EFFECTS = {
 }
 OUTSIDE_CATALOGUE = ("quadratic_drag",)
 HIDDEN = tuple(name for name in EFFECTS if name not in OUTSIDE_CATALOGUE)
-SMALLEST_SHARE, LARGEST_SHARE = 0.10, 0.60
+draw_size = partial(drawn_size, EFFECTS, OUTSIDE_CATALOGUE)
 OFF_BY_A_TWENTIETH = (
     "main_kg",
     "floating_kg",
@@ -54,19 +64,10 @@ def draw(hidden: str | None, seed: int) -> Case:
 
     Raises KeyError for an unknown effect.
     """
-    if hidden is not None and hidden not in EFFECTS:
-        raise KeyError(f"truth: {hidden} is not a hidden effect; there are {', '.join(EFFECTS)}")
+    require_known(hidden, EFFECTS)
     rng = generator(hidden, seed, "draw")
     size = draw_size(hidden, rng)
     return Case(hidden, seed, size, _differences(hidden, rng), _accessories(rng), plant=PLANT)
-
-
-def draw_size(hidden: str | None, rng: np.random.Generator) -> float:
-    """Log-uniform in 10..60 % of typical; a law outside the catalogue gets the upper half."""
-    if hidden is None:
-        return 0.0
-    low = 0.30 if hidden in OUTSIDE_CATALOGUE else SMALLEST_SHARE
-    return EFFECTS[hidden].drawn_size(low, LARGEST_SHARE, rng)
 
 
 def _differences(hidden: str | None, rng: np.random.Generator) -> tuple[Difference, ...]:
@@ -81,8 +82,7 @@ def _differences(hidden: str | None, rng: np.random.Generator) -> tuple[Differen
     change["algebraic_share"] = rng.uniform(0.5, 1.0)
     change["contact_n_m"] = NOMINAL.contact_n_m * rng.uniform(-0.3, 0.3)
     change["pressure_lag_s"] = rng.uniform(1e-3, 2e-3)
-    own = EFFECTS[hidden].fields if hidden else ()
-    return tuple(Difference(f, float(c)) for f, c in change.items() if f not in own)
+    return differences_of(change, EFFECTS, hidden)
 
 
 def _accessories(rng: np.random.Generator) -> tuple[tuple[str, float], ...]:
@@ -96,11 +96,4 @@ def _accessories(rng: np.random.Generator) -> tuple[tuple[str, float], ...]:
 
 def gearbox_of(case: Case, without: str = "") -> Gearbox:
     """The true actuator; `without` names a field whose difference is off, or "hidden"."""
-    changes = dict(case.accessories)
-    for difference in case.differences:
-        if difference.field != without:
-            changes[difference.field] = getattr(NOMINAL, difference.field) + difference.change
-    if case.hidden:
-        size = 0.0 if without == "hidden" else case.size
-        changes.update({field: size for field in EFFECTS[case.hidden].fields})
-    return replace(NOMINAL, **changes)
+    return replace(NOMINAL, **true_fields(case, NOMINAL, EFFECTS, without))

@@ -14,8 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
+from studies.truth.case import Case, Difference, generator
 from studies.truth.cases import read_cases
-from studies.truth.draw import EFFECTS, HIDDEN, Case, Difference, drive_of, generator
+from studies.truth.draw import EFFECTS, HIDDEN, drive_of
 from studies.truth.drive import Drive
 from studies.truth.manoeuvre import training_reference, validation_reference
 from studies.truth.record import Table, table, write_csv

@@ -4,15 +4,24 @@ Source: physics.md 2.6 (nominal values), 6 (effects, and their ranges).
 """
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
-from studies.truth.case import Case, Difference, Hidden, generator
+from studies.truth.case import (
+    Case,
+    Difference,
+    Hidden,
+    differences_of,
+    drawn_size,
+    generator,
+    require_known,
+    true_fields,
+)
 from studies.truth.soft_joint import SoftJoint
 
 PLANT = "soft_joint"
 NOMINAL = SoftJoint()
-TANK_M3 = 1e-3
 EFFECTS = {
     "valve_stuck_band": Hidden(("stuck_band_share",), 0.03),
     "chamber_leak": Hidden(("chamber_leak_m2",), 3e-7),
@@ -24,7 +33,7 @@ EFFECTS = {
 }
 OUTSIDE_CATALOGUE = ("joint_motion",)
 HIDDEN = tuple(name for name in EFFECTS if name not in OUTSIDE_CATALOGUE)
-SMALLEST_SHARE, LARGEST_SHARE = 0.10, 0.60
+draw_size = partial(drawn_size, EFFECTS, OUTSIDE_CATALOGUE)
 
 
 def draw(hidden: str | None, seed: int) -> Case:
@@ -32,19 +41,10 @@ def draw(hidden: str | None, seed: int) -> Case:
 
     Raises KeyError for an unknown effect.
     """
-    if hidden is not None and hidden not in EFFECTS:
-        raise KeyError(f"truth: {hidden} is not a hidden effect; there are {', '.join(EFFECTS)}")
+    require_known(hidden, EFFECTS)
     rng = generator(hidden, seed, "draw")
     size = draw_size(hidden, rng)
     return Case(hidden, seed, size, _differences(hidden, rng), _accessories(rng), plant=PLANT)
-
-
-def draw_size(hidden: str | None, rng: np.random.Generator) -> float:
-    """Log-uniform in 10..60 % of typical; a law outside the catalogue gets the upper half."""
-    if hidden is None:
-        return 0.0
-    low = 0.30 if hidden in OUTSIDE_CATALOGUE else SMALLEST_SHARE
-    return EFFECTS[hidden].drawn_size(low, LARGEST_SHARE, rng)
 
 
 def _differences(hidden: str | None, rng: np.random.Generator) -> tuple[Difference, ...]:
@@ -66,8 +66,7 @@ def _differences(hidden: str | None, rng: np.random.Generator) -> tuple[Differen
     supply = 0.02 * NOMINAL.supply_pressure_pa * rng.standard_normal()
     if hidden == "supply_droop":  # the only case without a record of the supply
         change["supply_pressure_pa"] = supply
-    own = EFFECTS[hidden].fields if hidden else ()
-    return tuple(Difference(f, float(c)) for f, c in change.items() if f not in own)
+    return differences_of(change, EFFECTS, hidden)
 
 
 def _accessories(rng: np.random.Generator) -> tuple[tuple[str, float], ...]:
@@ -84,12 +83,4 @@ def _accessories(rng: np.random.Generator) -> tuple[tuple[str, float], ...]:
 
 def joint_of(case: Case, without: str = "") -> SoftJoint:
     """The true bellows; `without` names a field whose difference is off, or "hidden"."""
-    changes = dict(case.accessories)
-    for difference in case.differences:
-        if difference.field != without:
-            changes[difference.field] = getattr(NOMINAL, difference.field) + difference.change
-    if case.hidden and without != "hidden":
-        changes.update({field: case.size for field in EFFECTS[case.hidden].fields})
-        if case.hidden == "supply_droop":
-            changes["tank_per_m3"] = 1 / TANK_M3
-    return replace(NOMINAL, **changes)
+    return replace(NOMINAL, **true_fields(case, NOMINAL, EFFECTS, without))
