@@ -91,17 +91,15 @@ class CascadeGain:
     poles: np.ndarray
 
     def feedback(self, area_m2: float) -> np.ndarray:
-        """The same as a state feedback, V per unit of state, shape (4,)."""
-        stiffness, damping, _ = self.outer
+        """The same as a feedback of states and integral, V per unit of each, shape (5,)."""
+        stiffness, damping, integral = self.force * self.outer
         at_pressure = self.force * area_m2
-        return np.array(
-            [
-                self.force * stiffness,
-                self.force * damping - self.speed,
-                at_pressure,
-                -at_pressure,
-            ]
-        )
+        return np.array([stiffness, damping - self.speed, at_pressure, -at_pressure, integral])
+
+    def law(self, area_m2: float, sample_time_s: float) -> Law:
+        """Its memory is the integral of the error."""
+        *feedback, integral = self.feedback(area_m2)
+        return integral_of(np.array(feedback), integral, sample_time_s)
 
 
 @dataclass(frozen=True)
@@ -117,10 +115,8 @@ class Cascade:
     @property
     def laws(self) -> Schedule[Law]:
         """What it does while the slide moves and no limit is met."""
-        area, dt = self.task.area_m2, self.sample_time_s
-        return self.gains.mapped(
-            lambda gain: integral_of(gain.feedback(area), gain.force * gain.outer[2], dt)
-        )
+        numbers = self.task.area_m2, self.sample_time_s
+        return self.gains.mapped(lambda gain: gain.law(*numbers))
 
     def start(self) -> Command:
         return Command(self.task.valve.shut, Memory())
@@ -169,6 +165,5 @@ def cascade_gain(mode: Mode, area_m2: float, spec: CascadeSpec) -> CascadeGain:
     damping = 2.0 * spec.damping * w + mode.A[v, v]  # less what the mode damps by itself
     outer = mass_kg * np.array([w**2, damping, w**2 / spec.integral_time_s])
     gain = CascadeGain(tau * spec.force_bandwidth_hz / rise, -taken / rise, outer, np.zeros(0))
-    K = np.array([*gain.feedback(area_m2), gain.force * outer[2]])
-    poles = gain_of(mode, K, spec.sample_time_s).poles
+    poles = gain_of(mode, gain.feedback(area_m2), spec.sample_time_s).poles
     return replace(gain, poles=poles)

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solve_discrete_are
 
+from controllers.margins import Law, integral_of
 from linearize.discrete import sampled
 from linearize.modes import Mode
 from workbench.errors import InputError, Message, listed, nearest
@@ -37,6 +38,10 @@ class Gain:
     feedback: np.ndarray
     integral: float
     poles: np.ndarray
+
+    def law(self, sample_time_s: float) -> Law:
+        """Its memory is the integral of the error."""
+        return integral_of(self.feedback, self.integral, sample_time_s)
 
 
 def lq_gain(

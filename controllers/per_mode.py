@@ -22,7 +22,7 @@ import numpy as np
 
 from controllers.cascade import CascadeSpec, cascade_gain
 from controllers.lq import Gain, gain_of, lq_gain
-from controllers.margins import Law, integral_of
+from controllers.margins import Law
 from controllers.motion import PREVIEW
 from controllers.pid import PidSpec, pid_gain
 from controllers.positioning import STATES, Memory, Positioning, PositioningSpec, positioning
@@ -67,8 +67,7 @@ class PerMode:
     @property
     def laws(self) -> Schedule[Law]:
         """What it does while the slide moves and no limit is met."""
-        dt = self.sample_time_s
-        return self.gains.mapped(lambda gain: integral_of(gain.feedback, gain.integral, dt))
+        return self.gains.mapped(lambda gain: gain.law(self.sample_time_s))
 
     def start(self) -> Command:
         return Command(self.task.valve.shut, Memory(plan=0.0))
@@ -132,8 +131,7 @@ def _pid(mode: Mode, _area_m2: float, sample_time_s: float) -> Gain:
 
 def _cascade(mode: Mode, area_m2: float, sample_time_s: float) -> Gain:
     found = cascade_gain(mode, area_m2, CascadeSpec())
-    K = np.array([*found.feedback(area_m2), found.force * found.outer[2]])
-    return gain_of(mode, K, sample_time_s)
+    return gain_of(mode, found.feedback(area_m2), sample_time_s)
 
 
 GAINS: Mapping[Method, Callable[[Mode, float, float], Gain]] = {

@@ -15,7 +15,7 @@ import numpy as np
 
 from controllers.axis import Axis, axis_of
 from controllers.lq import Gain, lq_gain
-from controllers.margins import Law, integral_of
+from controllers.margins import Law
 from controllers.motion import PREVIEW, MotionLimits, Sliding, going_with, motion, sliding_on
 from controllers.ranges import InRanges, ranges_of
 from controllers.scheduled import Schedule, scheduled
@@ -70,8 +70,7 @@ class Regulator:
     @property
     def laws(self) -> Schedule[Law]:
         """What it does while no limit is met."""
-        dt = self.sample_time_s
-        return self.gains.mapped(lambda gain: integral_of(gain.feedback, gain.integral, dt))
+        return self.gains.mapped(lambda gain: gain.law(self.sample_time_s))
 
     def start(self) -> Command:
         return Command(self.valve.shut, 0.0)

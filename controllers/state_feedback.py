@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from controllers.lq import Gain, lq_gain
-from controllers.margins import Law, integral_of
+from controllers.margins import Law
 from controllers.motion import PREVIEW
 from controllers.positioning import (
     STATES,
@@ -64,8 +64,7 @@ class StateFeedback:
     @property
     def laws(self) -> Schedule[Law]:
         """What it does while the slide moves and no limit is met."""
-        dt = self.sample_time_s
-        return self.gains.mapped(lambda gain: integral_of(gain.feedback, gain.integral, dt))
+        return self.gains.mapped(lambda gain: gain.law(self.sample_time_s))
 
     def start(self) -> Command:
         return Command(self.task.valve.shut, Memory())
