@@ -90,16 +90,24 @@ def state_limits(plant: Plant, spec: MpcSpec, method: str = "mpc") -> np.ndarray
     InputError
         If nothing is left between them.
     """
+    low, high = ends = state_ends(plant, spec)
+    if wrong := [*_numbers_without_room(spec, plant, method, np.less(low, high))]:
+        raise InputError(*wrong)
+    return ends
+
+
+def state_ends(plant: Plant, spec: MpcSpec) -> np.ndarray:
+    """As :func:`state_limits`, also where nothing is left between them."""
     highest_pa = float(plant.values[SUPPLY]) - spec.below_supply_pa
     lowest_m, below_m = (max(spec.margin_m, each) for each in (spec.lowest_m, spec.below_end_m))
     low = [lowest_m, -spec.fastest_m_s, spec.lowest_pa, spec.lowest_pa]
     high = [stroke_m(plant) - below_m, spec.fastest_m_s, highest_pa, highest_pa]
-    if wrong := [*_without_room(spec, plant, method, np.less(low, high))]:
-        raise InputError(*wrong)
     return np.array([low, high])
 
 
-def _without_room(spec: MpcSpec, plant: Plant, method: str, roomy: np.ndarray) -> Iterator[Message]:
+def _numbers_without_room(
+    spec: MpcSpec, plant: Plant, method: str, roomy: np.ndarray
+) -> Iterator[Message]:
     """The numbers between which nothing is left, of the states that are not ``roomy``, (4,)."""
     position, _, *pressures = roomy
     kept = (

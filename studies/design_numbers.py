@@ -8,12 +8,17 @@ from math import inf
 from typing import Any
 
 from controllers import CONTROLLERS
+from controllers.mpc_limits import state_ends
 from controllers.mpc_spec import MpcSpec
+from controllers.positioning import STATES
 from linearize.axes import stroke_m
 from linearize.standard import POSITION, PRESSURES, SUPPLY, VELOCITY
 from studies.specification import Limit, Specification
 from workbench.errors import InputError, Message
 from workbench.plant import Plant
+
+KEPT_BY = {(POSITION,): ("lowest_m", "below_end_m"), PRESSURES: ("lowest_pa", "below_supply_pa")}
+"""Numbers of an MPC that keep states above and below."""
 
 
 def design_numbers(spec: Specification, method: str, plant: Plant) -> dict[str, Any]:
@@ -66,23 +71,14 @@ def _cramped(
 ) -> Iterator[Message]:
     """What is wrong with limits between which nothing is left, by the name in the file."""
     kept = {name: numbers.get(name, default) for name, default in vars(MpcSpec()).items()}
-    margin_m, stroke, supply_pa = kept["margin_m"], stroke_m(plant), float(plant.values[SUPPLY])
-    places = [limits[POSITION]] if POSITION in limits else []
-    pressures = [limits[name] for name in PRESSURES if name in limits]
-    below = [] if "lowest_m" in own else places
-    above = [] if "below_end_m" in own else places
-    yield from _without_room(
-        _tightest(below, max(margin_m, kept["lowest_m"]), 1),
-        _tightest(above, stroke - max(margin_m, kept["below_end_m"]), -1),
-        method,
-    )
-    below = [] if "lowest_pa" in own else pressures
-    above = [] if "below_supply_pa" in own else pressures
-    yield from _without_room(
-        _tightest(below, kept["lowest_pa"], 1),
-        _tightest(above, supply_pa - kept["below_supply_pa"], -1),
-        method,
-    )
+    low, high = state_ends(plant, MpcSpec(**kept)).tolist()
+    for names, (least, most) in KEPT_BY.items():
+        asked, at = [limits[name] for name in names if name in limits], STATES.index(names[0])
+        yield from _limits_without_room(
+            _tightest([] if least in own else asked, low[at], 1),
+            _tightest([] if most in own else asked, high[at], -1),
+            method,
+        )
 
 
 def _tightest(limits: Iterable[Limit], value: float, side: int) -> _End:
@@ -93,7 +89,7 @@ def _tightest(limits: Iterable[Limit], value: float, side: int) -> _End:
     return _End(value, next(same, None))
 
 
-def _without_room(low: _End, high: _End, method: str) -> Iterator[Message]:
+def _limits_without_room(low: _End, high: _End, method: str) -> Iterator[Message]:
     wrong = high.asked or low.asked
     if low.value < high.value or wrong is None:
         return
