@@ -157,22 +157,24 @@ def _advanced(
 def _stepped(windows: Windows, unknowns: Unknowns, at: Linearised, now: Cost) -> Cost:
     """The full step where it keeps half of what it promises, else the best of several damped ones.
 
-    Where none brings much, others are tried; see :func:`_rescued`.  Where start states alone move,
-    every window takes the step that suits it best.
+    Where none brings much, others are tried; see :func:`_rescued`.  Start states alone need no
+    others: every window has what suits it best already.
     """
     full, *damped = _damped_steps(at, unknowns)
-    first = _costs_after(windows, unknowns, now, [full])
-    if not len(unknowns):
-        first = Costs((best_of_each((now, *first.rows)),))
-    promised = now.cost - _promised(at, unknowns, full)
-    if now.cost - first.best.cost > HALF * promised > 0:
-        return first.best
-    tried = Costs((*first.rows, *_costs_after(windows, unknowns, now, damped).rows))
-    if not len(unknowns):
-        return best_of_each(tried.rows)
-    if now.cost - tried.best.cost > AGAIN * beyond_noise(now.cost, windows):
-        return tried.best
+    tried = _costs_after(windows, unknowns, now, [full])
+    found, promised = _best(tried, unknowns, now), now.cost - _promised(at, unknowns, full)
+    if now.cost - found.cost > HALF * promised > 0:
+        return found
+    tried = Costs((*tried.rows, *_costs_after(windows, unknowns, now, damped).rows))
+    found = _best(tried, unknowns, now)
+    if not len(unknowns) or now.cost - found.cost > AGAIN * beyond_noise(now.cost, windows):
+        return found
     return _rescued(windows, unknowns, at, now, tried)
+
+
+def _best(tried: Costs, unknowns: Unknowns, now: Cost) -> Cost:
+    """The cheapest step; where start states alone move, every window takes its own, or stays."""
+    return tried.best if len(unknowns) else best_of_each((now, *tried.rows))
 
 
 def _rescued(windows: Windows, unknowns: Unknowns, at: Linearised, now: Cost, tried: Costs) -> Cost:
