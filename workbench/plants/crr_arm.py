@@ -15,19 +15,11 @@ from __future__ import annotations
 from math import radians
 
 from workbench.effect import Effect
-from workbench.effects import (
-    ClockDrift,
-    EndStops,
-    JointFriction,
-    LinkGravity,
-    PacketPause,
-    SensorDelay,
-    SupplyDroop,
-)
+from workbench.effects import EndStops, JointFriction, LinkGravity, SupplyDroop
 from workbench.effects.sensors import sensor_flaws
 from workbench.linkage import HeldJoint, Joint, JointRod, Link, TorqueSource
 from workbench.plant import Plant, Signal
-from workbench.plants.crr_cylinder import NETWORK_S, SUPPLY_PA, CrrCylinder, surroundings
+from workbench.plants.crr_cylinder import SUPPLY_PA, CrrCylinder, network, surroundings
 
 STROKE_M = 0.0635
 START_RAD = radians(30.0)
@@ -75,9 +67,7 @@ def crr_arm() -> Plant:
             joint_stops(ROD, RANGE_RAD),
             *_link_effects(),
             SupplyDroop(name="supply_droop"),
-            SensorDelay(name="sensor_delay", signals=OUTPUTS, delay_s=NETWORK_S),
-            PacketPause(name="packet_pause", signals=NETWORK),
-            ClockDrift(name="clock_drift", signals=NETWORK),
+            *network(OUTPUTS, NETWORK),
             *sensor_flaws({OUTPUTS[0]: START_RAD}),
         ),
         commands=(CYLINDER.command,),

@@ -21,14 +21,17 @@ from workbench.effect import Effect
 from workbench.effects import (
     BristleFriction,
     ChamberLeak,
+    ClockDrift,
     CommandDelay,
     ConstantForce,
     DeadZone,
     EndCushion,
     LineDelay,
+    PacketPause,
     PistonLeak,
     ProportionalValve,
     RodEnd,
+    SensorDelay,
     SpringForce,
     StuckBand,
     ThermalFriction,
@@ -63,6 +66,15 @@ def surroundings() -> tuple[Supply, Atmosphere]:
     return (
         Supply(name="supply", pressure_pa=SUPPLY_PA, temperature_k=ROOM_K),
         Atmosphere(name="atmosphere", pressure_pa=ATMOSPHERE_PA),
+    )
+
+
+def network(outputs: tuple[str, ...], signals: tuple[str, ...]) -> tuple[Effect, ...]:
+    """What it does to outputs, and to all signals on their way."""
+    return (
+        SensorDelay(name="sensor_delay", signals=outputs, delay_s=NETWORK_S),
+        PacketPause(name="packet_pause", signals=signals),
+        ClockDrift(name="clock_drift", signals=signals),
     )
 
 

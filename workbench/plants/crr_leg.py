@@ -13,20 +13,13 @@ from __future__ import annotations
 
 from math import radians
 
-from workbench.effects import (
-    ClockDrift,
-    JointFriction,
-    LinkGravity,
-    PacketPause,
-    SensorDelay,
-    SupplyDroop,
-)
+from workbench.effects import JointFriction, LinkGravity, SupplyDroop
 from workbench.effects.sensors import sensor_flaws
 from workbench.leg import Leg
 from workbench.linkage import Joint, JointRod
 from workbench.plant import Plant, Signal
 from workbench.plants.crr_arm import STROKE_M, joint_stops
-from workbench.plants.crr_cylinder import NETWORK_S, SUPPLY_PA, CrrCylinder, surroundings
+from workbench.plants.crr_cylinder import SUPPLY_PA, CrrCylinder, network, surroundings
 
 NUMBERS = (1, 2, 3)
 JOINTS = ("joint_1", "joint_2", "joint_3")
@@ -87,9 +80,7 @@ def crr_leg() -> Plant:
             LinkGravity(name="link_gravity", linkage="leg", joints=JOINTS[1:], gravity_m_s2=9.81),
             *(JointFriction(name=f"joint_friction@{joint}", joint=joint) for joint in JOINTS),
             SupplyDroop(name="supply_droop"),
-            SensorDelay(name="sensor_delay", signals=OUTPUTS, delay_s=NETWORK_S),
-            PacketPause(name="packet_pause", signals=NETWORK),
-            ClockDrift(name="clock_drift", signals=NETWORK),
+            *network(OUTPUTS, NETWORK),
             *sensor_flaws(dict(zip(ANGLES, START_RAD, strict=True))),
         ),
         commands=tuple(cylinder.command for cylinder in CYLINDERS),

@@ -16,17 +16,11 @@ the valve's offset and on the joint.  Values and more errata: :mod:`workbench.pl
 
 from __future__ import annotations
 
-from workbench.effects import (
-    ClockDrift,
-    EndStops,
-    PacketPause,
-    SensorDelay,
-    SupplyDroop,
-)
+from workbench.effects import EndStops, SupplyDroop
 from workbench.effects.sensors import sensor_flaws
 from workbench.parts import Body
 from workbench.plant import Plant, Signal
-from workbench.plants.crr_cylinder import NETWORK_S, SUPPLY_PA, CrrCylinder, surroundings
+from workbench.plants.crr_cylinder import SUPPLY_PA, CrrCylinder, network, surroundings
 
 STROKE_M = 0.1524
 CYLINDER = CrrCylinder(stroke_m=STROKE_M, start_m=STROKE_M / 2)
@@ -47,9 +41,7 @@ def crr_rig() -> Plant:
             *CYLINDER.effects(),
             EndStops(name="stops", body="rod", stiffness_n_m=2e6, upper_m=STROKE_M),
             SupplyDroop(name="supply_droop"),
-            SensorDelay(name="sensor_delay", signals=OUTPUTS, delay_s=NETWORK_S),
-            PacketPause(name="packet_pause", signals=NETWORK),
-            ClockDrift(name="clock_drift", signals=NETWORK),
+            *network(OUTPUTS, NETWORK),
             *sensor_flaws({OUTPUTS[0]: CYLINDER.start_m}),
         ),
         commands=(CYLINDER.command,),

@@ -82,11 +82,11 @@ def _friction() -> BristleFriction:
     )
 
 
-def _command_path() -> tuple[Effect, ...]:
-    """What happens to a command before it opens the valve, in this order."""
+def servo_valve(*chambers: str) -> tuple[Effect, ...]:
+    """The valve on one or two chambers, after what happens to a command before it opens."""
     return (
         CommandDelay(name="command_delay", signal=COMMAND),
-        LineDelay(name="line_delay", signal=COMMAND, chambers=("chamber_a", "chamber_b")),
+        LineDelay(name="line_delay", signal=COMMAND, chambers=chambers),
         ValveHysteresis(name="valve_hysteresis", signal=COMMAND, span=RANGE_V, initial=CENTRE_V),
         ValveLag(name="valve_lag", signal=COMMAND, initial_v=CENTRE_V),
         ValveOffset(name="valve_offset", signal=COMMAND),
@@ -98,6 +98,15 @@ def _command_path() -> tuple[Effect, ...]:
             half_width_v=HALF_WIDTH_V,
         ),
         StuckBand(name="valve_stuck_band", signal=COMMAND, neutral=CENTRE_V, span=RANGE_V),
+        FivePortValve(
+            name="valve",
+            first=chambers[0],
+            second=chambers[1] if len(chambers) > 1 else None,
+            gas_constant_j_kg_k=GAS_CONSTANT_J_KG_K,
+            flow_area_m2=FLOW_AREA_M2,
+            centre_v=CENTRE_V,
+            leak_area_m2=LEAK_AREA_M2,
+        ),
     )
 
 
@@ -123,16 +132,7 @@ def servo_drive() -> Plant:
             Chamber(name=b, side=-1, dead_volume_m3=5.525e-5, **chamber),
         ),
         effects=(
-            *_command_path(),
-            FivePortValve(
-                name="valve",
-                first=a,
-                second=b,
-                gas_constant_j_kg_k=GAS_CONSTANT_J_KG_K,
-                flow_area_m2=FLOW_AREA_M2,
-                centre_v=CENTRE_V,
-                leak_area_m2=LEAK_AREA_M2,
-            ),
+            *servo_valve(a, b),
             WallHeat(name="wall_heat", chambers=(a, b), coefficient_w_m2_k=22.563),
             _friction(),
             ThermalFriction(name="friction_thermal", body="slide", rubbing_force_n=RUBBING_N),

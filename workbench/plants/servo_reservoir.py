@@ -10,19 +10,7 @@ Source: physics.md 2.4 (``servo_reservoir``): volume 0.344e-3 m3, 17.275 W/(m2 K
 
 from __future__ import annotations
 
-from workbench.effects import (
-    ChamberLeak,
-    CommandDelay,
-    DeadZone,
-    FivePortValve,
-    HeatedWall,
-    LineDelay,
-    StuckBand,
-    SupplyDroop,
-    ValveHysteresis,
-    ValveLag,
-    ValveOffset,
-)
+from workbench.effects import ChamberLeak, HeatedWall, SupplyDroop
 from workbench.effects.sensors import sensor_flaws
 from workbench.parts import Atmosphere, Supply
 from workbench.plant import Plant, Signal
@@ -30,13 +18,11 @@ from workbench.plants.servo_drive import (
     ATMOSPHERE_PA,
     CENTRE_V,
     COMMAND,
-    FLOW_AREA_M2,
     GAS_CONSTANT_J_KG_K,
-    HALF_WIDTH_V,
-    LEAK_AREA_M2,
     RANGE_V,
     ROOM_K,
     SUPPLY_PA,
+    servo_valve,
 )
 from workbench.vessel import Vessel
 
@@ -60,29 +46,7 @@ def servo_reservoir() -> Plant:
             ),
         ),
         effects=(
-            CommandDelay(name="command_delay", signal=COMMAND),
-            LineDelay(name="line_delay", signal=COMMAND, chambers=("reservoir",)),
-            ValveHysteresis(
-                name="valve_hysteresis", signal=COMMAND, span=RANGE_V, initial=CENTRE_V
-            ),
-            ValveLag(name="valve_lag", signal=COMMAND, initial_v=CENTRE_V),
-            ValveOffset(name="valve_offset", signal=COMMAND),
-            DeadZone(
-                name="valve_dead_zone",
-                signal=COMMAND,
-                centre_v=CENTRE_V,
-                neutral_v=CENTRE_V,
-                half_width_v=HALF_WIDTH_V,
-            ),
-            StuckBand(name="valve_stuck_band", signal=COMMAND, neutral=CENTRE_V, span=RANGE_V),
-            FivePortValve(
-                name="valve",
-                first="reservoir",
-                gas_constant_j_kg_k=GAS_CONSTANT_J_KG_K,
-                flow_area_m2=FLOW_AREA_M2,
-                centre_v=CENTRE_V,
-                leak_area_m2=LEAK_AREA_M2,
-            ),
+            *servo_valve("reservoir"),
             HeatedWall(name="wall_heat", chambers=("reservoir",), coefficient_w_m2_k=17.275),
             ChamberLeak(name="chamber_leak", chamber="reservoir"),
             SupplyDroop(name="supply_droop"),
