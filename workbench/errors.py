@@ -71,6 +71,15 @@ def listed(names: Iterable[object], most: int = 12) -> str:
     return ", ".join(names[:most]) + (f" and {rest} more" if rest > 0 else "")
 
 
+def unreadable(path: Path, error: OSError) -> InputError:
+    """What is wrong with a file that cannot be opened, naming one beside it that looks like it."""
+    if not isinstance(error, FileNotFoundError):
+        return InputError(Message(f"cannot be read: {error.strerror}", file=str(path)))
+    beside = [p.name for p in path.parent.glob("*")] if path.parent.is_dir() else []
+    near = nearest(path.name, beside)
+    return InputError(Message("there is no such file", nearest=near, file=str(path)))
+
+
 @contextmanager
 def whole_file(path: Path | str) -> Iterator[Path]:
     """A name to write to; it becomes ``path`` once all is written, and vanishes on an error."""

@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from workbench.errors import InputError, Message, listed, nearest
+from workbench.errors import InputError, Message, listed, nearest, unreadable
 
 _KEY = re.compile(r"""\s*("(?:[^"\\]|\\.)*"|'[^']*'|[A-Za-z0-9_-]+)\s*([.=\]])""")
 _QUOTED = re.compile(r""""(?:[^"\\]|\\.)*"|'[^']*'""")
@@ -156,12 +156,8 @@ def read_text(path_or_text: Path | str) -> tuple[str, Path | None]:
     path = Path(path_or_text)
     try:
         return path.read_text(encoding="utf-8-sig"), path
-    except FileNotFoundError:
-        beside = [p.name for p in path.parent.glob("*")] if path.parent.is_dir() else []
-        near = nearest(path.name, beside)
-        raise InputError(Message("there is no such file", nearest=near, file=str(path))) from None
     except OSError as error:
-        raise InputError(Message(f"cannot be read: {error.strerror}", file=str(path))) from None
+        raise unreadable(path, error) from None
     except UnicodeDecodeError as error:
         raise InputError(Message(f"cannot be read: {error}", file=str(path))) from None
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from workbench.errors import InputError, Message, listed, nearest
+from workbench.errors import InputError, Message, listed, nearest, unreadable
 
 
 class RecordingWarning(UserWarning):
@@ -62,12 +62,8 @@ def open_bytes(path: Path) -> bytes:
     """
     try:
         content = path.read_bytes()
-    except FileNotFoundError:
-        beside = [p.name for p in path.parent.glob("*")] if path.parent.is_dir() else []
-        near = nearest(path.name, beside)
-        raise InputError(Message("there is no such file", nearest=near, file=str(path))) from None
     except OSError as error:
-        raise InputError(Message(f"cannot be read: {error.strerror}", file=str(path))) from None
+        raise unreadable(path, error) from None
     if not content.strip():
         raise InputError(Message("the file is empty", file=str(path)))
     return content
