@@ -32,12 +32,13 @@ from linearize.standard import (
     vessel_modes,
 )
 from workbench.contracts import Controller
-from workbench.errors import InputError, Message, UnknownNameError, listed, nearest, whole_file
+from workbench.errors import InputError, Message, UnknownNameError, listed, nearest
 from workbench.plant import Plant
 from workbench.plant_files import as_it_came, plant_named, plant_text
 from workbench.rig_laws import law_terms, laws_of, with_laws
 from workbench.rig_text import RigText, quoted, read_text
 from workbench.units import public_name, si_unit
+from workbench.whole_file import whole_file
 
 PLANTS = {
     slide_modes: SLIDE_MODES,

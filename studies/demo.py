@@ -32,12 +32,12 @@ from studies.text_of_results import ADDED, addition_text, diagnosis_text, unit_n
 from workbench.comparison import compare
 from workbench.diagnosis.diagnose import diagnose
 from workbench.diagnosis.improve import accept
-from workbench.errors import whole_file
 from workbench.fitting.windows import WINDOW_S
 from workbench.reading import read_recording
 from workbench.recording import Recording
 from workbench.rig import Rig, load_rig
 from workbench.rig_writing import write_rig
+from workbench.whole_file import whole_file
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

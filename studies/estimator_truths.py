@@ -23,8 +23,8 @@ from studies.truth.instruments import quantised
 from studies.truth.manoeuvre import training_reference
 from studies.truth.run import closed_loop
 from studies.truth.soft_joint import NEUTRAL
-from workbench.errors import whole_file
 from workbench.plants.servo_drive import OUTPUTS as DRIVEN
+from workbench.whole_file import whole_file
 
 EXACT, DRAWN = "exact", "drawn"
 SERVO_SAMPLES, GEARBOX_SAMPLES = 2000, 2000

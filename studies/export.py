@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from studies.figures.style import save
-from workbench.errors import whole_file
+from workbench.whole_file import whole_file
 
 if TYPE_CHECKING:
     from linearize.modes import HybridModel

@@ -16,7 +16,6 @@ import numpy as np
 from studies.text import columns, percent, shown
 from studies.truth import dedicated as truth
 from studies.truth import drive as true
-from workbench.errors import whole_file
 from workbench.identification import PROCEDURES
 from workbench.identification.dead_volume import dead_volume
 from workbench.identification.dead_zone import dead_zone
@@ -27,6 +26,7 @@ from workbench.identification.wall_heat import wall_heat
 from workbench.recording import Recording
 from workbench.rig import load_rig
 from workbench.units import public_name
+from workbench.whole_file import whole_file
 
 CHANNELS = {
     # column of the truth: channel, column of the file, its unit, and how many of those a SI unit is

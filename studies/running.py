@@ -20,7 +20,8 @@ from studies.tables import noted_tables, write_tables
 from studies.text import columns
 from studies.versions import code, versions
 from studies.workers import Workers, working_with
-from workbench.errors import InputError, Message, listed, nearest, whole_file
+from workbench.errors import InputError, Message, listed, nearest
+from workbench.whole_file import whole_file
 
 ALL = "all"
 DEBUG = "WORKBENCH_DEBUG"

@@ -18,7 +18,6 @@ from scipy.optimize import minimize, minimize_scalar
 
 from studies.truth.soft_joint_event import EventRecord, event_records
 from workbench.called import called
-from workbench.errors import whole_file
 from workbench.model import run_of
 from workbench.plant import Plant
 from workbench.plants.soft_joint import (
@@ -30,6 +29,7 @@ from workbench.plants.soft_joint import (
 )
 from workbench.plants.soft_joint_parametric import soft_joint_parametric
 from workbench.recording import Recording
+from workbench.whole_file import whole_file
 
 PSI_PA = 6894.757
 SAMPLE_TIME_S = 1.0 / 400

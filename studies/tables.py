@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
 
-from workbench.errors import whole_file
+from workbench.whole_file import whole_file
 
 GAP = "  "
 NEVER = "never"  # stands for a number where something is not reached

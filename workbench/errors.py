@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from dataclasses import dataclass
 from difflib import SequenceMatcher, get_close_matches
 from pathlib import Path
@@ -78,20 +75,3 @@ def unreadable(path: Path, error: OSError) -> InputError:
     beside = [p.name for p in path.parent.glob("*")] if path.parent.is_dir() else []
     near = nearest(path.name, beside)
     return InputError(Message("there is no such file", nearest=near, file=str(path)))
-
-
-@contextmanager
-def whole_file(path: Path | str) -> Iterator[Path]:
-    """A name to write to; it becomes ``path`` once all is written, and vanishes on an error."""
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-    os.close(handle)
-    try:
-        yield Path(name)
-        mask = os.umask(0)
-        os.umask(mask)
-        os.chmod(name, 0o666 & ~mask)  # as any new file; mkstemp keeps others out
-        os.replace(name, path)
-    finally:
-        Path(name).unlink(missing_ok=True)

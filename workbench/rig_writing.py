@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from workbench.errors import whole_file
 from workbench.plant import Plant
 from workbench.plant_files import as_it_came, plant_text
 from workbench.recording_format import default_format, format_lines
@@ -12,6 +11,7 @@ from workbench.rig import ACCEPTED, Rig
 from workbench.rig_laws import seen_lines, with_laws
 from workbench.rig_text import quoted
 from workbench.units import public_name, written
+from workbench.whole_file import whole_file
 
 
 def write_rig(rig: Rig, path: Path | str) -> None:

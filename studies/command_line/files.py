@@ -76,7 +76,7 @@ def write_json(path: Path | None, document: dict[str, Any]) -> None:
         return
     import json
 
-    from workbench.errors import whole_file
+    from workbench.whole_file import whole_file
 
     with whole_file(path) as unfinished:
         text = json.dumps(document, indent=2, allow_nan=False)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from studies.figures.drawn_numbers import write_drawn
-from workbench.errors import whole_file
+from workbench.whole_file import whole_file
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -25,9 +25,9 @@ from studies.page.mode_cuts import cuts_of
 from studies.sample_times import require_multiple
 from studies.specification import read_specification
 from studies.text import number
-from workbench.errors import whole_file
 from workbench.recording import Recording
 from workbench.rig import Rig
+from workbench.whole_file import whole_file
 
 Say = Callable[[str], None]
 

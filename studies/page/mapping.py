@@ -13,10 +13,11 @@ from studies.page.plausibility import column_names
 from studies.page.replay import NO_ACTION, Action
 from studies.page.session import TIME, Session, mapped, paths, with_opened, with_rig
 from studies.page.verbs import named, require_rig
-from workbench.errors import InputError, whole_file
+from workbench.errors import InputError
 from workbench.recording_format import channel_names
 from workbench.rig import load_rig
 from workbench.units import display_unit
+from workbench.whole_file import whole_file
 
 if TYPE_CHECKING:
     from bokeh.models import Model

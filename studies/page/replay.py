@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from workbench.errors import whole_file
+from workbench.whole_file import whole_file
 
 HEAD = '''"""What was done on the page, in order; run it in the folder where the page was.
 

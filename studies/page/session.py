@@ -13,11 +13,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from studies.page.replay import Action, begin_lines, recordings_lines
-from workbench.errors import InputError, Message, whole_file
+from workbench.errors import InputError, Message
 from workbench.recording import Recording
 from workbench.recording_format import ChannelFormat
 from workbench.rig import Rig, load_rig
 from workbench.rig_writing import rig_text
+from workbench.whole_file import whole_file
 
 if TYPE_CHECKING:
     from studies.page.control_tasks import Linearised, Looped

@@ -11,7 +11,8 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from workbench.errors import InputError, Message, whole_file
+from workbench.errors import InputError, Message
+from workbench.whole_file import whole_file
 
 SECTIONS, PAGE, FIGURES = "report.json", "report.html", "figures"
 ENDINGS = (".pdf", ".svg", ".csv")

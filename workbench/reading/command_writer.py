@@ -11,11 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
-from workbench.errors import whole_file
 from workbench.plant import Plant
 from workbench.recording import Recording
 from workbench.rig import Rig
 from workbench.units import display_scale, public_name, scale
+from workbench.whole_file import whole_file
 
 MISSING = "nan"  # in numbered columns that nothing is written to
 

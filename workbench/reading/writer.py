@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from workbench.errors import whole_file
 from workbench.recording import Recording
 from workbench.units import STANDARD_ATMOSPHERE_PA, display_unit, public_name, scale
+from workbench.whole_file import whole_file
 
 GAP = 10.5  # samples of time between two pieces, so that they are found again
 
