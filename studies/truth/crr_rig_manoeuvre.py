@@ -8,11 +8,12 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from studies.truth.movement import move, time_s
+from studies.truth.movement import between, move, multi_tone, sweep, time_s
 
 SAMPLES = 10_000
 MIDDLE_M, START_M = 0.0762, 0.040
 LOW_M, HIGH_M = 0.018, 0.134
+TONES_HZ_M_S = ((0.55, 0.13), (1.1, 0.13), (2.1, 0.10), (3.7, 0.05))  # 0.45 m/s together
 CENTRE_V = 5.25
 # Those of physics.md 2.1 (250, 200, 8) ring at 20 Hz with a real valve: a person turns them down.
 PROPORTIONAL_V_M, INTEGRAL_V_M_S, DERIVATIVE_V_S_M, FILTER_S = 150.0, 100.0, 4.0, 3e-3
@@ -24,7 +25,8 @@ def training_reference(rng: np.random.Generator) -> np.ndarray:
     last = parts[0][-1]
     slope = rng.uniform(0.008, 0.020) * np.sign(MIDDLE_M - last)
     parts.append(last + slope * np.minimum(time_s(1900), 1.9 - time_s(1900)))
-    parts.append(_multi_tone(rng, parts[-1][-1], SAMPLES - sum(map(len, parts))))
+    left = SAMPLES - sum(map(len, parts))
+    parts.append(multi_tone(rng, parts[-1][-1], MIDDLE_M, left, TONES_HZ_M_S))
     return _clip(np.concatenate(parts))
 
 
@@ -37,7 +39,7 @@ def validation_reference(rng: np.random.Generator) -> np.ndarray:
         np.full(500, START_M),
         move(START_M, rng.uniform(0.115, HIGH_M), 900, rng.uniform(0.3, 0.6)),
     ]
-    parts.append(_sweep(rng, parts[-1][-1], 3600))
+    parts.append(sweep(rng, parts[-1][-1], MIDDLE_M, 3600, 3.0, 0.050))
     parts.append(move(parts[-1][-1], rng.uniform(LOW_M, 0.05), 1000, rng.uniform(0.3, 0.6)))
     creep = rng.uniform(0.008, 0.020) * time_s(SAMPLES - sum(map(len, parts)))
     return _clip(np.concatenate([*parts, parts[-1][-1] + creep]))
@@ -55,33 +57,7 @@ def _moves(rng: np.random.Generator, samples: int) -> np.ndarray:
         far = targets[-1] + rng.choice([-1, 1]) * rng.uniform(0.01, 0.08)
         targets.append(far if LOW_M < far < HIGH_M else 2 * MIDDLE_M - targets[-1])
         lengths.append(int(rng.uniform(450, 900)))
-    parts, last = [np.full(100, START_M)], START_M
-    for target, length in zip(targets, lengths, strict=True):
-        parts.append(move(last, target, length, speed=rng.uniform(0.2, 0.6)))
-        last = parts[-1][-1]
-    return np.concatenate(parts)[:samples]
-
-
-def _multi_tone(rng: np.random.Generator, start: float, samples: int) -> np.ndarray:
-    """Four tones of 0.5..4 Hz around mid-stroke, faded in, with at most 0.45 m/s together."""
-    t = time_s(samples)
-    frequency = np.array([0.55, 1.1, 2.1, 3.7]) * rng.uniform(0.9, 1.1, 4)
-    speed = np.array([0.13, 0.13, 0.10, 0.05]) * rng.uniform(0.8, 1.1, 4)
-    phase = rng.uniform(0, 2 * np.pi, 4)
-    tones = speed / (2 * np.pi * frequency) * np.sin(2 * np.pi * frequency * t[:, None] + phase)
-    fade = move(0.0, 1.0, samples, speed=3.5)
-    return start + (MIDDLE_M - start) * fade + fade * tones.sum(axis=1)
-
-
-def _sweep(rng: np.random.Generator, start: float, samples: int) -> np.ndarray:
-    """Sine from 0.4 to about 3 Hz with falling amplitude, faded in from the start position."""
-    t = time_s(samples)
-    low, high = 0.4 * rng.uniform(0.9, 1.1), 3.0 * rng.uniform(0.9, 1.1)
-    span = t[-1]
-    phase = 2 * np.pi * low * span / np.log(high / low) * ((high / low) ** (t / span) - 1)
-    amplitude = 0.050 * (low / high) ** (0.75 * t / span)
-    fade = move(0.0, 1.0, samples, speed=3.0)
-    return start + fade * (MIDDLE_M + amplitude * np.cos(phase) - start)
+    return between(rng, START_M, targets, lengths, (0.2, 0.6))[:samples]
 
 
 def start_loop(position_m: np.ndarray, reference_m: np.ndarray) -> SimpleNamespace:

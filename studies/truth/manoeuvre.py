@@ -9,19 +9,21 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from studies.truth.movement import move, time_s
+from studies.truth.movement import between, move, multi_tone, sweep, time_s
 
 SAMPLES = 10_000
-START_M = 0.060
+MIDDLE_M, START_M = 0.145, 0.060
 LOW_M, HIGH_M = 0.038, 0.248
 TRAVEL_SPEED_M_S = 0.9
+TONES_HZ_M_S = ((0.45, 0.25), (0.9, 0.25), (1.7, 0.2), (2.9, 0.1))  # 0.8 m/s together
 
 
 def training_reference(rng: np.random.Generator) -> np.ndarray:
     """Random steps with rests (6.4 s), ramp at 25..50 mm/s (0.8 s), multi-tone (2.8 s)."""
     steps = _steps(rng, 6400)
-    ramp = steps[-1] + np.sign(0.145 - steps[-1]) * rng.uniform(0.025, 0.05) * time_s(800)
-    return _clip(np.concatenate([steps, ramp, _multi_tone(rng, ramp[-1], 2800)]))
+    ramp = steps[-1] + np.sign(MIDDLE_M - steps[-1]) * rng.uniform(0.025, 0.05) * time_s(800)
+    tones = multi_tone(rng, ramp[-1], MIDDLE_M, 2800, TONES_HZ_M_S)
+    return _clip(np.concatenate([steps, ramp, tones]))
 
 
 def validation_reference(rng: np.random.Generator) -> np.ndarray:
@@ -34,7 +36,7 @@ def validation_reference(rng: np.random.Generator) -> np.ndarray:
         np.full(600, rise[-1]),
         move(rise[-1], rng.uniform(0.235, HIGH_M), 900, TRAVEL_SPEED_M_S),
     ]
-    parts.append(_sweep(rng, parts[-1][-1], 3600))
+    parts.append(sweep(rng, parts[-1][-1], MIDDLE_M, 3600, 2.5, 0.095))
     parts.append(move(parts[-1][-1], rng.uniform(LOW_M, 0.08), 1000, TRAVEL_SPEED_M_S))
     last = parts[-1][-1]
     parts.append(last + rng.uniform(0.02, 0.05) * time_s(SAMPLES - sum(map(len, parts))))
@@ -51,35 +53,9 @@ def _steps(rng: np.random.Generator, samples: int) -> np.ndarray:
     lengths = [1700, 1600]
     while sum(lengths) < samples:
         far = targets[-1] + rng.choice([-1, 1]) * rng.uniform(0.02, 0.16)
-        targets.append(far if LOW_M < far < HIGH_M else 0.29 - targets[-1])
+        targets.append(far if LOW_M < far < HIGH_M else 2 * MIDDLE_M - targets[-1])
         lengths.append(int(rng.uniform(500, 1000)))
-    parts, last = [np.full(100, START_M)], START_M
-    for target, length in zip(targets, lengths, strict=True):
-        parts.append(move(last, target, length, speed=rng.uniform(0.5, 1.1)))
-        last = parts[-1][-1]
-    return np.concatenate(parts)[:samples]
-
-
-def _multi_tone(rng: np.random.Generator, start: float, samples: int) -> np.ndarray:
-    """Four tones of 0.4..3 Hz around mid-stroke, faded in, with at most 0.8 m/s together."""
-    t = time_s(samples)
-    frequency = np.array([0.45, 0.9, 1.7, 2.9]) * rng.uniform(0.9, 1.1, 4)
-    speed = np.array([0.25, 0.25, 0.2, 0.1]) * rng.uniform(0.8, 1.1, 4)
-    phase = rng.uniform(0, 2 * np.pi, 4)
-    tones = speed / (2 * np.pi * frequency) * np.sin(2 * np.pi * frequency * t[:, None] + phase)
-    fade = move(0.0, 1.0, samples, speed=3.5)
-    return start + (0.145 - start) * fade + fade * tones.sum(axis=1)
-
-
-def _sweep(rng: np.random.Generator, start: float, samples: int) -> np.ndarray:
-    """Sine from 0.4 to about 2.5 Hz with falling amplitude, faded in from the start position."""
-    t = time_s(samples)
-    low, high = 0.4 * rng.uniform(0.9, 1.1), 2.5 * rng.uniform(0.9, 1.1)
-    span = t[-1]
-    phase = 2 * np.pi * low * span / np.log(high / low) * ((high / low) ** (t / span) - 1)
-    amplitude = 0.095 * (low / high) ** (0.75 * t / span)
-    fade = move(0.0, 1.0, samples, speed=3.0)
-    return start + fade * (0.145 + amplitude * np.cos(phase) - start)
+    return between(rng, START_M, targets, lengths, (0.5, 1.1))[:samples]
 
 
 @dataclass(frozen=True)
