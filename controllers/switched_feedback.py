@@ -28,13 +28,13 @@ from linearize.modes import HybridModel
 from linearize.shift_modes import valve_flows
 from linearize.shifting import STATES
 from linearize.valve_response import MASK, age
+from linearize.valve_sample import STANDING_PA
 from workbench.contracts import Command, Estimate
 
 SAMPLE_TIME_S, HOLD = 1e-3, 4
 PER_M, S_PER_M = 100.0, 1.0
 TOLERABLE = np.array([3e5, 3e5, 1e-3, 0.3])  # of the states
 TOLERABLE_KG_S = 5e-3
-STANDING_PA = 3e5
 GAUGED = ("Low side 1 charges 2 charges", "High side 1 charges 2 charges")
 
 

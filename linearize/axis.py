@@ -13,12 +13,11 @@ from math import inf
 
 import numpy as np
 
-from linearize.cuts import Interval, Region
+from linearize.cuts import Box, Interval
 from linearize.equilibrium import OperatingPoint, operating_point
 from linearize.reduction import DesignModel
 
 BESIDE = 0.1  # of the half-width of the middle interval of a command
-Box = Mapping[str, Region]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -84,6 +84,7 @@ class Jump:
 
 Region = Interval | Level
 Cuts = Mapping[str, tuple[Region, ...]]
+Box = Mapping[str, Region]
 
 
 def checked(model: DesignModel, cuts: Mapping[str, Iterable[Region]]) -> Cuts:

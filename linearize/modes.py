@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from linearize.cuts import Guard, Interval, Jump, Level, Region, checked
+from linearize.cuts import Box, Guard, Interval, Jump, Level, Region, checked
 from linearize.equilibrium import OperatingPoint, operating_point
 from linearize.reduction import DesignModel, LeftOut, design_model
 from workbench.errors import InputError, Message
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Guard", "HybridModel", "Interval", "Level", "Mode", "hybrid_modes"]
 
-Box = Mapping[str, Region]
 Placing = Callable[[DesignModel, Box], OperatingPoint]
 """Finds the point of a box."""
 

@@ -25,12 +25,11 @@ from studies.draws import kept_rows
 from studies.kept import Row
 from studies.study import Claim, Extent, Outcome, Study
 from studies.text import columns, number
-from studies.yardsticks import Closed, Draw, draw_of, medians, sine, step
+from studies.yardsticks import PAYLOAD_KG, Closed, Draw, draw_of, medians, sine, step
 from workbench.effects.timing import PacketPause
 from workbench.plant import Plant
 
 DRAWS = {Extent.QUICK: 3, Extent.FULL: 20}
-PAYLOAD_KG = 5.8
 COMPARED = ("lq", "pid")
 DELAYS_MS = (0.0, 2.0, 4.0, 5.0, 6.0, 7.0, 8.0, 10.0, 12.0)
 REDRAWS_HZ = (1.0, 10.0)

@@ -36,8 +36,8 @@ from studies.estimator_claims import (
     velocity_claims,
     velocity_text,
 )
-from studies.estimator_modes import modes_named
-from studies.estimator_positions import by_position_alone
+from studies.estimator_modes import RUNS, modes_named
+from studies.estimator_positions import AWAY, LATE, by_position_alone
 from studies.estimator_runs import follow, nees, rmse, whiteness
 from studies.estimator_truths import (
     DRAWN,
@@ -52,13 +52,10 @@ from studies.study import Extent, Outcome, Study
 from studies.versions import work_folder
 
 JUDGED = ("ekf", "ukf", "mhe")  # for consistency; the others do not know the disturbance
-RUNS = 50
 RUNS_DRAWN = {Extent.QUICK: 10, Extent.FULL: RUNS}
 RUNS_OF_A_PLANT = {Extent.QUICK: 3, Extent.FULL: 10}  # besides the one that tunes
 SAMPLES = 1000  # of a run for consistency: a rest and a move
 EVERY = 10  # samples of the error that is kept
-AWAY = 50  # samples from the last change between rest and motion
-LATE = 200  # first sample that is judged for velocity and pressure
 VELOCITIES = {"servo_drive": "slide.velocity_m_s", "gearbox": "main_piston.velocity_m_s"}
 POSITION_ROWS = {"servo_drive": 0, "gearbox": 2}
 

@@ -24,11 +24,10 @@ from studies.draws import kept_rows
 from studies.kept import Row
 from studies.study import Claim, Extent, Outcome, Study
 from studies.text import columns, number
-from studies.yardsticks import FINAL, LARGE, ONE, RISE, draw_of, measured, medians
+from studies.yardsticks import FINAL, LARGE, ONE, PAYLOAD_KG, RISE, draw_of, measured, medians
 from workbench.plant import Plant
 
 DRAWS = {Extent.QUICK: 3, Extent.FULL: 20}
-PAYLOAD_KG = 5.8
 DESIGN = "lq"
 WHOLE = "nothing"
 FRICTION = ("friction.coulomb_force_n", "friction.stiction_excess_n")

@@ -15,13 +15,12 @@ import numpy as np
 from studies.identification import DRIVE, WRONG_DRIVE, Answer, recording, recordings_of_flow
 from studies.text import columns, shown
 from studies.truth import dedicated as truth
-from workbench.comparison import compare
+from workbench.comparison.compare import FREE_RUN, compare
 from workbench.identification import PROCEDURES
 from workbench.identification.tank_curves import tank_curves
 from workbench.recording import Recording
 from workbench.rig import Rig, load_rig
 
-FREE_RUN = "free run"
 TABLE_7 = {
     "slide.position_m": 0.46e-3,
     "chamber_a.pressure_pa": 0.148e5,

@@ -27,11 +27,10 @@ from studies.kept import Row
 from studies.scenarios import SAMPLE_TIME_S, Scenario
 from studies.study import Claim, Extent, Outcome, Study
 from studies.text import columns, number
-from studies.yardsticks import Closed, draw_of, medians, sine
+from studies.yardsticks import PAYLOAD_KG, Closed, draw_of, medians, sine
 from workbench.plant import Plant
 
 DRAWS = {Extent.QUICK: 3, Extent.FULL: 20}
-PAYLOAD_KG = 5.8
 COMPARED = ("lq", "mpc")
 PLACES = (1, 2, 3, 9)
 NEAR_END_M, STEP_M, WIDE_M = 0.01, 0.04, 0.13

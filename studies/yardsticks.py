@@ -32,6 +32,7 @@ from workbench.rig import Rig, default_rig
 
 MASS = "slide.mass_kg"
 PAYLOADS_KG = (2.2, 5.8, 10.0)
+PAYLOAD_KG = 5.8  # of studies that vary something else
 KNOWN_WITHIN = 0.2
 CYCLE_M = 0.1e-3  # motion at rest that counts as a limit cycle
 FIRST_SEED = 1001  # of draws that no design was tuned on

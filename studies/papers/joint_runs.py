@@ -18,6 +18,7 @@ from studies.papers.loops import DT, FINE, LINEAR_AREA, VISCOUS_ONLY, Pid, loope
 from workbench.closed_loop import Hardware
 from workbench.plant import Plant
 from workbench.plants.crr_arm import MOTION, crr_arm
+from workbench.plants.crr_cylinder import OFFSET_V
 from workbench.recording import Recording
 from workbench.rig import default_rig
 from workbench.simulation import simulate
@@ -32,7 +33,6 @@ LACKED = {"valve_lag.time_constant_s": 1 / (2 * pi * 100.0), "wall_heat.coeffici
 HARDWARE = Hardware(
     noise={ANGLE: np.radians(0.05), **dict.fromkeys(PRESSURES, 500.0)}, converter_bits=12
 )
-OFFSET_V = 5.25
 PULSES_V, PULSE_S, AFTER_S = (5.4, 5.6, 5.8, 6.0), 0.15, 3.0
 CALM_DEG_S = 5.0
 RAMPS_V_S = (0.25, 0.5, 1.0)

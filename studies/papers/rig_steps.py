@@ -15,11 +15,10 @@ from studies.truth import crr_rig as true
 from workbench.effects import StribeckFriction
 from workbench.identification.sliding import BreakAway, Motion, SteadyRun, motion, steady_run
 from workbench.plant import Plant
-from workbench.plants.crr_cylinder import NOMINAL_CENTRE_V
+from workbench.plants.crr_cylinder import NOMINAL_CENTRE_V, OFFSET_V
 from workbench.recording import Recording
 from workbench.simulation import simulate
 
-OFFSET_V = 5.25
 FITTED_V = (6.0, 5.75, 5.5, 5.35, 5.15, 5.0, 4.75, 4.5, 4.0)
 OTHER_V = (5.875, 5.625, 5.4, 5.3, 5.25, 5.2, 5.1, 4.875, 4.625, 4.25)
 SUPPLIES_PA = (5e5, 6.5e5, 8e5)

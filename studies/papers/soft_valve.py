@@ -21,6 +21,7 @@ import numpy as np
 from studies.figures.panels import Line, Panel, panels_figure
 from studies.figures.style import BLACK, BLUE, GREEN, ORANGE, PAGE_IN, RED
 from studies.papers.findings import Finding, outcome
+from studies.soft_joint_fits import PSI_PA
 from studies.study import Claim, Extent, Outcome, Study
 from studies.text import columns
 from workbench.effects import ThreePortValve
@@ -45,7 +46,7 @@ RECORDS = {Extent.QUICK: 200, Extent.FULL: 5000}
 COMMANDS = (0.55, 0.6, 0.7, 1.0)
 CORNERS = (0.002, 0.005, 0.01, 0.02, 0.04)
 CHOSEN = 0.01
-STEP_S, PSI_PA = 2.5e-3, 6894.757
+STEP_S = 2.5e-3
 SHEET = np.linspace(0.0, 1.0, 21)  # commands at which one reads a printed curve
 HOLD_S, HELD_PA = 5.0, 40 * PSI_PA + ATMOSPHERE_PA
 

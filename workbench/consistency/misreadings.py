@@ -16,7 +16,7 @@ import numpy as np
 
 from workbench.effects.forces import EndStops
 from workbench.plant import Plant
-from workbench.reading.plausible import BEYOND, LIMITS
+from workbench.reading.plausible import BEYOND, LIMITS, VACUUM_PA
 from workbench.recording import Recording
 from workbench.units import STANDARD_ATMOSPHERE_PA, suffix
 
@@ -42,7 +42,6 @@ FACTORS = {
 }
 ANY = {10.0: TEN, 1e3: THOUSAND}
 TURNED = ("position_m", "angle_rad", "velocity_m_s", "force_n")
-VACUUM_PA = 1e3
 
 Rows = Mapping[str, np.ndarray]
 

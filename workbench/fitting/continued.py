@@ -16,12 +16,11 @@ from __future__ import annotations
 import numpy as np
 
 from workbench.fitting.costs import best_of_each, points_costs
-from workbench.fitting.gauss_newton import Fit, beyond_noise, fit_windows
+from workbench.fitting.gauss_newton import Fit, fit_windows, worth_it
 from workbench.fitting.linearised import Point, plant_at
 from workbench.fitting.windows import Windows
 
 ROUNDS = 6
-WORTH_IT = 0.003  # of the misfit, for a fit from the new starts
 
 
 def continued(fit: Fit, iterations: int) -> Fit:
@@ -36,7 +35,7 @@ def continued(fit: Fit, iterations: int) -> Fit:
             break
         points = [fit.point, Point(fit.point.t, starts)]
         begun = best_of_each(points_costs(windows, unknowns, points).rows)
-        if not begun.cost < fit.cost - WORTH_IT * beyond_noise(fit.cost, windows):
+        if not worth_it(begun.cost, fit):
             break
         fit = fit_windows(windows, unknowns, begun, iterations)
     return fit

@@ -13,7 +13,7 @@ from workbench.fitting.begun_anew import begun_anew
 from workbench.fitting.errors import Errors, errors_of
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.own_errors import by_own_errors
-from workbench.fitting.posterior import fitted_rig, posterior_covariance
+from workbench.fitting.posterior import FLAT, fitted_rig, posterior_covariance
 from workbench.fitting.problem import NO_EVIDENCE, pose, proves_nothing
 from workbench.fitting.short_windows import better_from_short_windows
 from workbench.fitting.start_states import as_it_came
@@ -22,7 +22,6 @@ from workbench.plant import require
 from workbench.recording import Recording
 from workbench.rig import Rig
 
-FLAT = 0.98  # posterior over prior deviation: the recording says nothing of the parameter
 AT_BOUND = 1e-9
 
 

@@ -42,6 +42,7 @@ ASTRAY = 4.0  # times its cost: so dear a window gets by start states where it k
 AGAIN = 0.02  # fall, in parts of the misfit, above which derivatives are used once more
 CONVERGED = 0.01  # the same, below which a fit has converged
 NOISE_KNOWN_TO = 0.05  # of its square
+WORTH_IT = 0.003  # of the misfit, for a fit to go on from there
 
 
 @dataclass(frozen=True)
@@ -203,6 +204,11 @@ def beyond_noise(squares: float, windows: Windows) -> float:
     as no less than that, or a share of next to nothing would speak for an effect.
     """
     return max(squares - windows.floor, NOISE_KNOWN_TO * windows.floor, 1.0)
+
+
+def worth_it(cost: float, fit: Fit) -> bool:
+    """Whether a place costs so much less than a fit that fitting goes on from there."""
+    return cost < fit.cost - WORTH_IT * beyond_noise(fit.cost, fit.windows)
 
 
 Step = tuple[np.ndarray, np.ndarray]  # of the scaled unknowns, and of the scaled start states

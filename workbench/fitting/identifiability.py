@@ -15,6 +15,7 @@ import numpy as np
 
 from workbench.fitting.linearised import Point, linearise
 from workbench.fitting.noise import measured_noise
+from workbench.fitting.posterior import FLAT
 from workbench.fitting.problem import staged
 from workbench.fitting.unknowns import nominal_unknowns
 from workbench.fitting.window_length import window_length_s
@@ -23,7 +24,6 @@ from workbench.recording import Recording
 from workbench.rig import Rig
 
 MOST_WINDOWS = 24
-FLAT = 0.98  # of the prior deviation: what is left so wide was not told
 NOTHING = 1e-6  # of the largest singular value: below it a direction is not seen at all
 
 

@@ -14,6 +14,7 @@ from workbench.law_range import seen_in
 from workbench.rig import Rig
 from workbench.rig_laws import laws_of
 
+FLAT = 0.98  # posterior over prior deviation: the recording says nothing of the parameter
 FAR_MOVED = 2.0  # prior deviations: what moves more is worth a word
 
 

@@ -17,12 +17,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from workbench.fitting.gauss_newton import Fit, beyond_noise, fit_windows
+from workbench.fitting.gauss_newton import Fit, fit_windows, worth_it
 from workbench.fitting.linearised import Point
 
 FACTORS = (1.0 / 1.2, 1.2)  # twice the tenth to which a size should be known
 ROUNDS = 4
-WORTH_IT = 0.003  # of the misfit, for a fit to go on from there
 
 
 def resized(fit: Fit, names: Sequence[str], iterations: int) -> Fit:
@@ -36,7 +35,7 @@ def resized(fit: Fit, names: Sequence[str], iterations: int) -> Fit:
             for point in points_of_sizes(fit, names, FACTORS)
         ]
         lowest = min(fits, key=lambda each: each.cost, default=fit)
-        if not lowest.cost < fit.cost - WORTH_IT * beyond_noise(fit.cost, fit.windows):
+        if not worth_it(lowest.cost, fit):
             break
         fit = lowest
     return fit

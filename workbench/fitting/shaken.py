@@ -20,13 +20,7 @@ from __future__ import annotations
 import numpy as np
 
 from workbench.fitting.costs import costs_of_best_starts
-from workbench.fitting.gauss_newton import (
-    Fit,
-    beside,
-    beyond_noise,
-    fit_windows,
-    follow,
-)
+from workbench.fitting.gauss_newton import Fit, beside, fit_windows, follow, worth_it
 from workbench.fitting.linearised import Point, normal_equations, seen_at
 from workbench.fitting.window_length import moves
 from workbench.fitting.windows import position_alone
@@ -34,7 +28,6 @@ from workbench.fitting.windows import position_alone
 DRAWS = 16  # points of a round
 SPREADS = (1.0, 3.0)  # posterior deviations, one round each
 PASSES = 3  # over the spreads, while they lead lower
-WORTH_IT = 0.003  # of the misfit, for a fit to go on from there
 FURTHEST = 2.0  # of a scaled unknown
 FOLLOWED = 4  # steps with known derivatives
 
@@ -64,7 +57,7 @@ def _lower(fit: Fit, points: list[Point], iterations: int) -> Fit:
     start = costs_of_best_starts(windows, unknowns, points, fit.point.starts).best
     at = seen_at(windows, fit.derivatives, start.point, start.residual)
     tried = follow(windows, unknowns, start, at, FOLLOWED)
-    if not tried.cost < fit.cost - WORTH_IT * beyond_noise(fit.cost, windows):
+    if not worth_it(tried.cost, fit):
         return fit
     return fit_windows(windows, unknowns, tried.point, iterations)
 
