@@ -27,7 +27,7 @@ from workbench.diagnosis.law import better_base, empirical_law, standing
 from workbench.diagnosis.next_recording import recommended
 from workbench.diagnosis.pairs import with_pairs
 from workbench.diagnosis.ranking import ranked
-from workbench.diagnosis.result import NAMING, Diagnosis, Law, Ranked, Where
+from workbench.diagnosis.result import NAMING, Diagnosis, Evidence, Law, Ranked, Where
 from workbench.diagnosis.scan import Profile
 from workbench.diagnosis.settle import with_settled_sizes
 from workbench.diagnosis.verdict import far_above_noise, judged, sentence, unexplained, unsteady
@@ -83,46 +83,13 @@ def diagnose(
         warnings += ("the prior fit did not converge: the ranking is provisional",)
     progress("where it fails")
     where, begun = locate(problem, train), problem.base
-    found = _asked(problem, where, progress)
-    better = better_base(found.problem, found.law)
-    if better:
-        progress("the prior fit is improved by what the law found: once more")
-        found = _asked(better, where, progress)
-        found = replace(found, law=standing(found.problem, found.law))
-    problem, profiles = found.problem, found.profiles
-    ranking, law = found.ranking, found.law
-    if where and problem.base is not begun:
-        where = replace(where, by_regime=regime_shares(problem.base))
-    far = far_above_noise(problem.base_validation)
-    verdict = judged(ranking, law, evidence.strong, far)
-    if verdict in NAMING or (ranking and ranking[0].accepted):
-        progress("sizes of what is named")
-        ranking = with_settled_sizes(problem, ranking)
-    best = ranking[0] if verdict in NAMING else None
-    if best and best.fit and not best.fit.converged:
-        warnings += (f"the refit with {best.candidate.name} did not converge: its size may be off",)
-    after = (law.fit, law.validation) if law else (best and best.fit, best and best.validation)
-    warnings += unexplained(far, verdict, ranking)
-    told = credible(
-        Diagnosis(
-            rig_name=rig.name,
-            verdict=verdict,
-            sentence=sentence(verdict, ranking, law, evidence),
-            ranking=ranking,
-            where=where,
-            before=errors_of(problem.base, problem.base_validation),
-            after=errors_of(*after) if after[0] else {},
-            law=law,
-            warnings=warnings,
-            base=problem.base,
-            base_validation=problem.base_validation,
-            next_recording=recommended(problem, verdict, ranking, progress),
-            evidence=evidence,
-            strained=strained(problem.base),
-        ),
-        doubts,
-    )
-    return replace(told, warnings=told.warnings + unsteady(ranking, profiles, told.verdict))
+    found = _asked_at_best(problem, where, progress)
+    if where and found.problem.base is not begun:
+        where = replace(where, by_regime=regime_shares(found.problem.base))
+    told = _concluded(rig.name, found, where, evidence, progress)
+    told = credible(replace(told, warnings=warnings + told.warnings), doubts)
+    unsure = unsteady(told.ranking, found.profiles, told.verdict)
+    return replace(told, warnings=told.warnings + unsure)
 
 
 @dataclass(frozen=True)
@@ -133,6 +100,17 @@ class _Asked:
     profiles: list[Profile]
     ranking: tuple[Ranked, ...]
     law: Law | None
+
+
+def _asked_at_best(problem: Problem, where: Where | None, progress: Progress) -> _Asked:
+    """All of it; once more where the law finds a better prior fit."""
+    found = _asked(problem, where, progress)
+    better = better_base(found.problem, found.law)
+    if not better:
+        return found
+    progress("the prior fit is improved by what the law found: once more")
+    found = _asked(better, where, progress)
+    return replace(found, law=standing(found.problem, found.law))
 
 
 def _asked(problem: Problem, where: Where | None, progress: Progress) -> _Asked:
@@ -180,3 +158,37 @@ def _law(
     if law is None or not clearly_less(1.0 - law.drop_train, 1.0 - effect):
         return None
     return law if law.drop_train > shift else None
+
+
+def _concluded(
+    rig_name: str, found: _Asked, where: Where | None, evidence: Evidence, progress: Progress
+) -> Diagnosis:
+    """What is said of it, with warnings of what it rests on."""
+    problem, ranking, law = found.problem, found.ranking, found.law
+    far = far_above_noise(problem.base_validation)
+    verdict = judged(ranking, law, evidence.strong, far)
+    if verdict in NAMING or (ranking and ranking[0].accepted):
+        progress("sizes of what is named")
+        ranking = with_settled_sizes(problem, ranking)
+    best = ranking[0] if verdict in NAMING else None
+    warnings = unexplained(far, verdict, ranking)
+    if best and best.fit and not best.fit.converged:
+        told = f"the refit with {best.candidate.name} did not converge: its size may be off"
+        warnings = (told, *warnings)
+    after = (law.fit, law.validation) if law else (best and best.fit, best and best.validation)
+    return Diagnosis(
+        rig_name=rig_name,
+        verdict=verdict,
+        sentence=sentence(verdict, ranking, law, evidence),
+        ranking=ranking,
+        where=where,
+        before=errors_of(problem.base, problem.base_validation),
+        after=errors_of(*after) if after[0] else {},
+        law=law,
+        warnings=warnings,
+        base=problem.base,
+        base_validation=problem.base_validation,
+        next_recording=recommended(problem, verdict, ranking, progress),
+        evidence=evidence,
+        strained=strained(problem.base),
+    )
