@@ -18,6 +18,7 @@ from studies.checking import apart, drawn
 from studies.following import BENCHES, STEP
 from studies.following_check import check_followed, tasks_of
 from studies.kept import Kept
+from studies.plain import plain
 from studies.study import Claim
 from studies.text import columns, shown
 from studies.yardsticks import FIRST_SEED
@@ -69,7 +70,7 @@ def _run(plant: Plant, method: str, number: int) -> dict[str, dict[str, list[flo
         return {}
     return {
         row.scenario: {
-            name: [_finite(row.figures[name]), _finite(most)] for name, most in row.asked.items()
+            name: [plain(row.figures[name]), plain(most)] for name, most in row.asked.items()
         }
         for row in rows
     }
@@ -84,10 +85,6 @@ def _claimed(plant: Plant) -> list[str]:
 def _designed(name: str, method: str) -> Controller:
     """The design for all draws, which is the same."""
     return design(method, PLANTS[name]()).controller
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
 
 
 def shares(runs: Sequence[Run]) -> dict[tuple[str, str], np.ndarray]:

@@ -26,6 +26,7 @@ from studies.checking import apart, drawn, styled_figures
 from studies.commissioning import claims as claims_after
 from studies.commissioning import commissioned, made_on_every_plant, reached_table
 from studies.kept import Kept, Row
+from studies.plain import plain
 from studies.shift_check import (
     FEWER,
     SHIFTS,
@@ -281,9 +282,7 @@ def _plain(value: object) -> object:
         return {key: _plain(each) for key, each in value.items()}
     if isinstance(value, list):
         return [_plain(each) for each in value]
-    if isinstance(value, float) and not np.isfinite(value):
-        return None
-    return value
+    return plain(value) if isinstance(value, float) else value
 
 
 STUDY = Study(

@@ -19,6 +19,7 @@ import numpy as np
 from estimators.losses import Absolute, Huber
 from studies.kept import Kept
 from studies.paper_004_figures import figures
+from studies.plain import plain
 from studies.soft_joint_fits import (
     FITTED_S,
     PSI_PA,
@@ -124,7 +125,10 @@ def outcome(
     claims = tuple(_claims(rows, searches, emptied, late, better))
     numbers = {
         "tau_s": tau_s,
-        "errors_psi": {name: _plain(asdict(row)) for name, row in rows.items()},
+        "errors_psi": {
+            name: {key: plain(value) for key, value in asdict(row).items()}
+            for name, row in rows.items()
+        },
         "lag_s": late,
         "fallbacks": {setting.name: count for setting, count in lost.items()},
         "searches": {name: [asdict(each) for each in found] for name, found in searches.items()},
@@ -133,11 +137,6 @@ def outcome(
     }
     drawn = figures(data, fixed, searches, taus, better, rows, wanted)
     return Outcome(_text(tau_s, rows, late, searches, better), claims, drawn, numbers)
-
-
-def _plain(numbers: Mapping[str, float]) -> dict[str, float | None]:
-    """Numbers as JSON knows them: None stands for NaN."""
-    return {name: value if np.isfinite(value) else None for name, value in numbers.items()}
 
 
 def _of_plant(data: Data, plant: Plant, values: Mapping[str, float]) -> Worth:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from studies.plain import plain
 from studies.text import columns, number, percent, shown
 from workbench.units import public_name, si_unit
 
@@ -144,8 +145,8 @@ def _row_document(each: EstimatedRecording, row: Estimated) -> dict[str, Any]:
             }
             for horizon, errors in row.horizons.items()
         },
-        "nis": _plain(row.nis),
-        "coloured": {public_name(n): _plain(v) for n, v in zip(outputs, row.coloured, strict=True)},
+        "nis": plain(row.nis),
+        "coloured": {public_name(n): plain(v) for n, v in zip(outputs, row.coloured, strict=True)},
         "latency_s": {"median": row.median_s, "p99": row.p99_s},
         "state_rmse": {public_name(n): _value(v, n) for n, v in row.state_rmse.items()},
         "state_rmse_hidden": {public_name(n): _value(v, n) for n, v in row.hidden_rmse.items()},
@@ -157,8 +158,4 @@ def _row_document(each: EstimatedRecording, row: Estimated) -> dict[str, Any]:
 
 
 def _value(value: float, name: str) -> dict[str, Any]:
-    return {"value": _plain(value), "unit": si_unit(name)}
-
-
-def _plain(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
+    return {"value": plain(value), "unit": si_unit(name)}
