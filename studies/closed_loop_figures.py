@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from studies.following_check import FollowingCheck
     from workbench.closed_loop import LoopRecord
 
 A_STEP = 20.0  # an error beyond so many times the range of interest is the step itself
@@ -63,15 +64,18 @@ def draw_command(axes: Axes, records: dict[str, LoopRecord]) -> None:
     axes.set_xlabel("time (s)")
 
 
+def by_scenario(check: Check | FollowingCheck) -> dict[str, dict[str, LoopRecord]]:
+    """Records of each scenario, by design and estimator."""
+    found: dict[str, dict[str, LoopRecord]] = {}
+    for row, record in zip(check.rows, check.records, strict=True):
+        found.setdefault(row.scenario, {})[f"{row.design}, {row.estimator}"] = record
+    return found
+
+
 def check_figures(check: Check) -> dict[str, Figure]:
     """One figure per scenario, by file name without ending: position, error and command."""
     figures = {}
-    for scenario in dict.fromkeys(row.scenario for row in check.rows):
-        records = {
-            f"{row.design}, {row.estimator}": record
-            for row, record in zip(check.rows, check.records, strict=True)
-            if row.scenario == scenario
-        }
+    for scenario, records in by_scenario(check).items():
         figure = new_figure(PAGE_IN, 5.5)
         position, error, command = figure.subplots(3, sharex=True)
         draw_position(position, records)

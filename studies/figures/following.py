@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from studies.closed_loop_figures import by_scenario
 from studies.figures.style import GREY, PAGE_IN, new_figure
 from studies.following_check import FollowingCheck
 from studies.text import labelled
@@ -21,15 +22,7 @@ ROW_IN = 1.3
 
 def following_figures(found: FollowingCheck) -> dict[str, Figure]:
     """One figure per scenario, by file name without ending; a line per design and estimator."""
-    figures = {}
-    for scenario in dict.fromkeys(row.scenario for row in found.rows):
-        runs = {
-            f"{row.design}, {row.estimator}": record
-            for row, record in zip(found.rows, found.records, strict=True)
-            if row.scenario == scenario
-        }
-        figures[f"following_{scenario}"] = _figure(runs)
-    return figures
+    return {f"following_{name}": _figure(runs) for name, runs in by_scenario(found).items()}
 
 
 def _figure(runs: dict[str, LoopRecord]) -> Figure:
