@@ -14,15 +14,14 @@ TANK_M3 = 1e-3  # behind a supply that droops
 
 @dataclass(frozen=True)
 class Hidden:
-    """One effect that the detector has to find: its field, typical size, how it acts.
+    """One effect that the detector has to find: its fields and typical size.
 
-    `signed`: the sign is drawn too. `replaces`: the size stands instead of the nominal value.
+    The size stands instead of the nominal value. `signed`: the sign is drawn too.
     """
 
     fields: tuple[str, ...]
     typical: float
     signed: bool = False
-    replaces: bool = False
 
     def drawn_size(self, smallest: float, largest: float, rng: np.random.Generator) -> float:
         """Log-uniform between two shares of typical, with a sign where that is drawn too."""

@@ -23,9 +23,9 @@ from studies.truth.gearbox import Gearbox
 PLANT = "gearbox"
 NOMINAL = Gearbox()
 EFFECTS = {
-    "coulomb_friction": Hidden(("coulomb_main_n",), 60.0, replaces=True),
-    "viscous_friction": Hidden(("viscous_main_n_s_m",), 60.0, replaces=True),
-    "detent": Hidden(("detent_n",), 300.0, replaces=True),
+    "coulomb_friction": Hidden(("coulomb_main_n",), 60.0),
+    "viscous_friction": Hidden(("viscous_main_n_s_m",), 60.0),
+    "detent": Hidden(("detent_n",), 300.0),
     "synchroniser": Hidden(("synchroniser_n",), 1500.0),
     "command_delay": Hidden(("delay_1_s",), 0.015),
     "exhaust_restriction": Hidden(("exhaust_restriction_2",), 0.3),
