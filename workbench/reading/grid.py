@@ -21,7 +21,7 @@ CLOCK = 0.6  # of a sample: a clock this close to even ticks evenly, its stamps 
 
 @dataclass(frozen=True)
 class Grid:
-    """Sample times of gap-free pieces; ``grid_s`` is None where the samples already lie on it."""
+    """Sample times of gap-free pieces; ``grids_s`` is None where the samples already lie on it."""
 
     time_s: np.ndarray
     sample_time_s: float
