@@ -95,6 +95,15 @@ def test_a_report_of_others_is_refused(tmp_path):
         render_folder(tmp_path)
 
 
+@pytest.mark.parametrize("content", [b"", b"\xff\xfe picture"])
+def test_a_figure_that_is_no_svg_is_named(tmp_path, content):
+    (tmp_path / "empty.svg").write_bytes(content)
+
+    with pytest.raises(InputError, match=r"empty\.svg: is no SVG file"):
+        render_folder(tmp_path)
+    assert not (tmp_path / "report.html").exists()
+
+
 def test_steps_of_the_page_are_told_in_the_words_of_their_commands(tmp_path):
     """Of the page itself, which keeps no fits, and of its replay script, which has them."""
     rig = default_rig("servo_drive")
