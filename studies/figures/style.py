@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -27,6 +27,7 @@ MOST_POINTS = 2000  # of a curve; more are not seen and swell the files
 
 _COLOURS = (BLUE, RED, GREEN, ORANGE, PURPLE, SKY, BLACK)
 LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1)), (0, (3, 1)), (0, (1, 1)))
+TURN = 4  # of the kinds of lines, once all colours were there: neighbours differ in grey, too
 
 
 @contextmanager
@@ -66,6 +67,16 @@ def new_figure(width_in: float, height_in: float) -> Figure:
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width_in, height_in), layout="constrained")
+
+
+def kind_of_line(k: int) -> Any:
+    """Of the k-th of many lines in colours of the cycle: no two of the first 49 are alike."""
+    return LINES[(k + TURN * (k // len(LINES))) % len(LINES)]
+
+
+def look(k: int) -> dict[str, Any]:
+    """Colour and kind of the k-th of many lines."""
+    return {"color": f"C{k}", "linestyle": kind_of_line(k)}
 
 
 def thinned(*columns: np.ndarray) -> list[np.ndarray]:
