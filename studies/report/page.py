@@ -115,7 +115,7 @@ def inline(svg: str, name: str) -> str:
         If there is no such element.
     """
     bare = re.sub(r"<metadata>.*?</metadata>", "", svg[svg.index("<svg") :], flags=re.DOTALL)
-    name = name.replace("/", "-")
+    name = re.sub(r"[^\w-]", lambda odd: f"-{ord(odd[0]):x}-", name)  # no quote, no bracket
     own = re.sub(r'\bid="', f'id="{name}-', bare)
     own = re.sub(r'href="#', f'href="#{name}-', own)
     return re.sub(r"url\(#", f"url(#{name}-", own)
