@@ -18,7 +18,7 @@ from studies.figures.limits import limit_figures
 from studies.figures.mode_count import mode_count_figure
 from studies.figures.panels import Line, Panel, panels_figure
 from studies.figures.robustness import influence_figure, spread_figure
-from studies.figures.style import new_figure, save, styled
+from studies.figures.style import MOST_POINTS, new_figure, save, styled
 from studies.robustness import Line as Asked
 from studies.robustness import Robustness
 from studies.specification import read_specification
@@ -133,6 +133,21 @@ def curves(label="time (s)", width_in=7.16, **looks):
 )
 def test_what_makes_a_figure_unfit_is_told(figure, fault):
     assert faults(figure) == [fault]
+
+
+def test_an_impact_of_one_sample_in_a_long_recording_is_drawn_and_stands_in_the_table(tmp_path):
+    """Of a minute every thirtieth sample had been taken, and what lay between was not there."""
+    time_s, error = 1e-3 * np.arange(60_000), np.zeros(60_000)
+    error[31_237], error[31_238], error[40_001] = 7.0, -9.0, np.nan
+    figure = panels_figure([[Panel("time (s)", "error (mm)", [Line(time_s, error, "e")])]], 7, 3)
+
+    (line,) = figure.axes[0].lines
+    x, y = line.get_data()
+    assert (np.nanmin(y), np.nanmax(y)) == (-9.0, 7.0)
+    assert x[np.nanargmax(y)] == time_s[31_237] and (x[0], x[-1]) == (time_s[0], time_s[-1])
+    assert len(x) < 2.1 * MOST_POINTS and (np.diff(x) > 0.0).all()
+    save(figure, tmp_path / "one", "x")
+    assert ",31.237,7\n" in (tmp_path / "one.csv").read_text()
 
 
 def test_black_and_a_light_colour_are_told_apart_without_another_line():

@@ -146,10 +146,10 @@ def _draw_term(axes: Axes, where: Where) -> None:
     time_s, term, spread = thinned(where.time_s, factor * where.term, factor * where.term_deviation)
     axes.fill_between(time_s, term - spread, term + spread, color=BLUE, alpha=0.2, linewidth=0)
     if where.intensities:
-        (other,) = thinned(factor * where.intensities.term)
+        other = thinned(where.time_s, factor * where.intensities.term)
         softer = where.intensities.neighbour < where.intensities.likeliest
         label_other = f"walk {'slower' if softer else 'faster'} than the likeliest"
-        axes.plot(time_s, other, color=ORANGE, linewidth=0.6, linestyle="--", label=label_other)
+        axes.plot(*other, color=ORANGE, linewidth=0.6, linestyle="--", label=label_other)
     axes.plot(time_s, term, color=BLUE, linewidth=0.6, label="missing term, one deviation shaded")
     axes.set_xlabel("time (s)")
     axes.set_ylabel(label)

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from studies.figures.decimation import peaks
 from studies.figures.style import BLUE, RED
-from studies.page.decimation import peaks
 from studies.page.look import MEASURED, chart, column, put, row, sharing, text
 from studies.text import RATE, labelled, percent
 from workbench.units import display_scale, display_unit, public_name, suffix
