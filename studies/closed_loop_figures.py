@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from linearize.standard import POSITION
 from studies.closed_loop_check import Check
-from studies.figures.style import LINES, PAGE_IN, new_figure
+from studies.figures.style import PAGE_IN, kind_of_line, new_figure
 from studies.scenarios import LATE_S
 from studies.text import number
 
@@ -87,13 +87,13 @@ def check_figures(check: Check) -> dict[str, Figure]:
     return figures
 
 
-def _styles(records: dict[str, LoopRecord]) -> list[dict[str, str]]:
+def _styles(records: dict[str, LoopRecord]) -> list[dict[str, Any]]:
     """One colour per design, and a kind of line of its own for each run, as a grey print asks."""
     designs = list(dict.fromkeys(name.rpartition(", ")[0] for name in records))
     return [
         {
             "color": f"C{designs.index(name.rpartition(', ')[0])}",
-            "linestyle": LINES[k % len(LINES)],
+            "linestyle": kind_of_line(k),
         }
         for k, name in enumerate(records)
     ]

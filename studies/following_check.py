@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from math import isfinite
 
 import numpy as np
 
@@ -44,7 +45,11 @@ class Followed:
     @property
     def reached(self) -> bool:
         """True when every figure is as asked."""
-        return all(self.figures[name] <= most for name, most in self.asked.items())
+        return all(self.holds(name) for name in self.asked)
+
+    def holds(self, name: str) -> bool:
+        """Whether a figure is as asked; what never ends is not, whatever the open valve does."""
+        return isfinite(self.figures[name]) and self.figures[name] <= self.asked[name]
 
 
 @dataclass(frozen=True)
@@ -277,7 +282,7 @@ def _lines(row: Followed, factor: float) -> Iterable[tuple[str, ...]]:
         found = row.figures[name]
         unit = suffix(name)
         words = name.removesuffix(f"_{unit}").replace("_", " ")
-        met = "yes" if found <= most else "no"
+        met = "yes" if row.holds(name) else "no"
         said = NEVER if found == np.inf else shown(found, name)
         told = (words, said, shown(most, name), met)
         yield (row.design, row.estimator, row.scenario, *told, *times)

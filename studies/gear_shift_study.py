@@ -26,7 +26,6 @@ from studies.checking import apart, drawn, styled_figures
 from studies.commissioning import claims as claims_after
 from studies.commissioning import commissioned, made_on_every_plant, reached_table
 from studies.kept import Kept, Row
-from studies.plain import plain
 from studies.shift_check import (
     FEWER,
     SHIFTS,
@@ -91,7 +90,7 @@ def run(folder: Path, extent: Extent, say: Callable[[str], None]) -> Outcome:
         "known, fewer judged": {name: _reached(fewer, name) for name in SHIFTS},
         "ranking": ranking(rows),
     }
-    return Outcome(text, claims, styled_figures(_shown(beside)), _plain(numbers))
+    return Outcome(text, claims, styled_figures(_shown(beside)), numbers)
 
 
 def designs(plant: Plant) -> dict[str, Controller]:
@@ -274,15 +273,6 @@ def _shown(beside: ShiftCheck) -> ShiftCheck:
     pairs = zip(beside.rows, beside.records, strict=True)
     kept = [(row, record) for row, record in pairs if row.design in (HYBRID, PD, SCHEDULED)]
     return ShiftCheck(*map(tuple, zip(*kept, strict=True)))
-
-
-def _plain(value: object) -> object:
-    """Numbers that JSON knows; what is not finite is None."""
-    if isinstance(value, Mapping):
-        return {key: _plain(each) for key, each in value.items()}
-    if isinstance(value, list):
-        return [_plain(each) for each in value]
-    return plain(value) if isinstance(value, float) else value
 
 
 STUDY = Study(

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from studies.figures.style import save_all
+from studies.plain import plain_all
 from studies.registry import STUDIES
 from studies.study import NUMBERS, TEXT, Extent, Outcome, Study
 from studies.tables import noted_tables, write_tables
@@ -63,7 +64,8 @@ def run_study(
         unfinished.write_text(text, encoding="utf-8")
     document = _document(study, found, extent, tables)
     with whole_file(folder / NUMBERS) as unfinished:  # the last: a study that has it is finished
-        unfinished.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+        content = json.dumps(document, indent=1, allow_nan=False)
+        unfinished.write_text(content + "\n", encoding="utf-8")
     show(text.rstrip("\n"))
     return _failed(study.name, document)
 
@@ -82,7 +84,7 @@ def _document(study: Study, found: Outcome, extent: Extent, tables: list[str]) -
         "claims": [asdict(claim) for claim in found.claims],
         "tables": tables,
         "figures": list(found.figures),
-        "numbers": dict(found.numbers),
+        "numbers": plain_all(found.numbers),
     }
 
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
-from math import nan
+from math import isfinite, nan
 
 import numpy as np
 
@@ -105,9 +105,9 @@ class Shift:
 
     @property
     def reached(self) -> bool:
-        """True when it is fast, soft, and not past Neutral."""
+        """True when it ends, fast and soft and not past Neutral, whatever the open loop does."""
         fast, soft = self.settling_s <= self.longest_s, self.impact_m_s <= self.hardest_m_s
-        return fast and soft and self.overshoot_m < OVERSHOT_M
+        return isfinite(self.settling_s) and fast and soft and self.overshoot_m < OVERSHOT_M
 
 
 @dataclass(frozen=True)

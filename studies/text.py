@@ -9,6 +9,7 @@ from studies.tables import NEVER, Table, note
 from workbench.diagnosis.result import told
 from workbench.units import display_scale, display_unit, public_name
 
+RATE = "rate of "  # before the name of a quantity
 LONG_S = 9e-3  # above, a number of microseconds has more than four digits
 
 
@@ -68,7 +69,12 @@ def spread(value: float, deviation: float, name: str, digits: int = 4) -> str:
 
 
 def labelled(name: str) -> str:
-    """A quantity in words with its unit, for an axis: ``chamber a pressure (bar)``."""
-    unit = display_unit(name)
+    """A quantity in words with its unit, for an axis: ``chamber a pressure (bar)``.
+
+    One that begins with ``rate of`` has the unit of a rate.
+    """
+    unit = display_unit(name.removeprefix(RATE))
+    if name.startswith(RATE):
+        unit = f"{unit or 1}/s"
     words = public_name(name).replace(".", " ").replace("_", " ")
     return f"{words} ({unit})" if unit else words

@@ -117,6 +117,29 @@ def test_identify_writes_over_no_recording(folder, monkeypatch):
         assert f"{words[1]}: is a file that this command reads" in answer.stderr
 
 
+ONE_ONTO_ANOTHER = [
+    ("design", ["--controller", "lq", "-o", "new", "--json", "./new"], "new"),
+    ("check", ["lq.toml", "--keep", "new", "--json", "new"], "new"),
+    ("check", ["lq.toml", "--json", "new", "--figures", "new/figures"], "new/figures"),
+    ("compare", ["run.csv", "--json", "new", "--figures", "new"], "new"),
+    ("improve", [*HELD_OUT, "-o", "new", "--json", "new"], "new"),
+    ("improve", [*HELD_OUT, "-o", "new", "--report", "new"], "new"),
+    ("identify", ["rig.toml", "run.csv", "-o", "new", "--json", "new/a"], "new/a"),
+]
+
+
+@pytest.mark.parametrize(("command", "words", "named"), ONE_ONTO_ANOTHER)
+def test_no_result_is_written_over_another(folder, monkeypatch, command, words, named):
+    monkeypatch.chdir(folder)
+    before = {*folder.iterdir()}
+
+    answer = call(command, "friction" if command == "identify" else "rig.toml", *words)
+
+    assert answer.exit_code == 2
+    assert f"workbench: {named}: is a file that this command writes besides" in answer.stderr
+    assert {*folder.iterdir()} == before
+
+
 def test_a_rig_may_be_bettered_in_its_own_file(folder):
     rig, recording = folder / "rig.toml", folder / "run.csv"
 

@@ -121,3 +121,18 @@ def test_what_nobody_named_is_told_apart_all_the_same(tmp_path):
     assert list(found["place (mm), panel 1"]) == [
         "place 1", "place 2", "level", "upright", "kept off the legend",
     ]  # fmt: skip
+
+
+def test_points_with_error_bars_are_named_by_their_label(tmp_path):
+    """As the flow of each path of a valve: both had been called after the axis."""
+    with styled():
+        figure = new_figure(3.5, 2.0)
+        axes = figure.subplots()
+        for label, area_mm2 in (("exhaust path", 2.0), ("supply path", 3.0)):
+            axes.errorbar([4.0, 6.0], [0.0, area_mm2], [0.1, 0.2], fmt="s", label=label)
+        axes.plot([4.0, 6.0], [1.0, 1.0], label="rig")
+        axes.set_ylabel("effective area (mm²)")
+
+    ((_, found),) = table(figure, tmp_path).items()
+    assert [*found] == ["exhaust path", "supply path", "rig"]
+    assert found["supply path"] == [("4", "0"), ("6", "3")]

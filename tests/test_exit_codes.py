@@ -1,5 +1,8 @@
 """What goes wrong, as a message and an exit code."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -69,3 +72,14 @@ def test_what_nobody_foresaw_is_one_line_and_its_trace_is_shown_when_asked(monke
     monkeypatch.setenv("WORKBENCH_DEBUG", "1")
     with pytest.raises(TypeError), answering():
         raise TypeError("argument")
+
+
+def test_a_reader_that_has_enough_ends_a_command_without_a_word():
+    """As behind ``| head``: what a shell calls SIGPIPE, and no wrong input."""
+    words = [sys.executable, "-m", "studies.command_line", "effects"]
+    command = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    command.stdout.close()
+
+    assert command.stderr.read() == b""
+    assert command.wait() == 141
+    command.stderr.close()

@@ -6,16 +6,19 @@ import numpy as np
 import pytest
 from check_loops import metrics
 from figure_faults import faults
+from matplotlib.colors import to_hex
 
+from studies.checked_runs import FEW
 from studies.closed_loop_check import Check
 from studies.closed_loop_figures import check_figures
 from studies.figures.delays import delay_figure
 from studies.figures.fidelity import fidelity_figure
+from studies.figures.following import following_figures
 from studies.figures.limits import limit_figures
 from studies.figures.mode_count import mode_count_figure
 from studies.figures.panels import Line, Panel, panels_figure
 from studies.figures.robustness import influence_figure, spread_figure
-from studies.figures.style import new_figure, save, styled
+from studies.figures.style import MOST_POINTS, new_figure, save, styled
 from studies.robustness import Line as Asked
 from studies.robustness import Robustness
 from studies.specification import read_specification
@@ -26,11 +29,11 @@ from workbench.rig import default_rig
 X = np.linspace(0.0, 1.0, 50)
 
 
-def closed_loops():
+def closed_loops(designs=("pid", "lq", "mpc"), estimators=("ekf", "mhe")):
     """Three designs with two estimators each, as a demo draws them."""
     rows, records = [], []
-    for design in ("pid", "lq", "mpc"):
-        for estimator in ("ekf", "mhe"):
+    for design in designs:
+        for estimator in estimators:
             names = ("slide.position_m", "reference.slide.position_m", "valve.command_v")
             recording = Recording("run", 1e-3, dict.fromkeys(names, X))
             rows.append(metrics(design=design, estimator=estimator))
@@ -52,10 +55,10 @@ def robust(make):
 MARKS = ("RMSE (mm)", "overshoot (mm)")
 
 
-def limited():
-    """Two runs against a limit both ways, and one of a pressure, which has no lower side."""
+def limited(designs=("pid", "lq")):
+    """Runs against a limit both ways, and one of a pressure, which has no lower side."""
     names, rows = ("slide.velocity_m_s", "chamber_a.pressure_pa"), []
-    for design in ("pid", "lq"):
+    for design in designs:
         rows.append((SimpleNamespace(design=design, scenario="step"), 1e5 * X))
     records = [
         SimpleNamespace(recording=Recording("run", 1e-3, dict.fromkeys(names, x))) for _, x in rows
@@ -82,6 +85,38 @@ def test_a_figure_is_fit_for_a_journal(name):
     assert not faults(FIGURES[name]())
 
 
+MANY = [f"lq {run + 1}" for run in range(FEW)]
+
+
+def followed(runs=MANY):
+    """Runs of an arm along a reference."""
+    names = ("joint.angle_rad", "reference.joint.angle_rad", "valve.command_v")
+    one = SimpleNamespace(recording=Recording("run", 1e-3, dict.fromkeys(names, X)))
+    rows = [SimpleNamespace(design=run, estimator="ekf", scenario="1-hz") for run in runs]
+    with styled():
+        return following_figures(SimpleNamespace(rows=rows, records=[one] * len(rows)))[
+            "following_1-hz"
+        ]
+
+
+@pytest.mark.parametrize(
+    "drawn",
+    [
+        lambda: closed_loops(MANY, ("ekf",)),
+        lambda: closed_loops(MANY[:6]),
+        lambda: limited(MANY),
+        followed,
+    ],
+)
+def test_all_runs_that_a_check_draws_are_told_apart(drawn):
+    """There are seven colours and kinds of lines: the eighth run had looked as the first."""
+    for axes in drawn().axes:
+        lines = [line for line in axes.lines if "lq" in str(line.get_label())]
+        with styled():  # in which C7 is C0 again
+            looks = {(to_hex(line.get_color()), str(line._dash_pattern)) for line in lines}
+        assert len(looks) == len(lines) == FEW
+
+
 def curves(label="time (s)", width_in=7.16, **looks):
     two = {"style": "-", "colour": "#0072B2"} | looks
     lines = [Line(X, X, "one", "-", "#D55E00"), Line(X, -X, "two", **two)]
@@ -98,6 +133,21 @@ def curves(label="time (s)", width_in=7.16, **looks):
 )
 def test_what_makes_a_figure_unfit_is_told(figure, fault):
     assert faults(figure) == [fault]
+
+
+def test_an_impact_of_one_sample_in_a_long_recording_is_drawn_and_stands_in_the_table(tmp_path):
+    """Of a minute every thirtieth sample had been taken, and what lay between was not there."""
+    time_s, error = 1e-3 * np.arange(60_000), np.zeros(60_000)
+    error[31_237], error[31_238], error[40_001] = 7.0, -9.0, np.nan
+    figure = panels_figure([[Panel("time (s)", "error (mm)", [Line(time_s, error, "e")])]], 7, 3)
+
+    (line,) = figure.axes[0].lines
+    x, y = line.get_data()
+    assert (np.nanmin(y), np.nanmax(y)) == (-9.0, 7.0)
+    assert x[np.nanargmax(y)] == time_s[31_237] and (x[0], x[-1]) == (time_s[0], time_s[-1])
+    assert len(x) < 2.1 * MOST_POINTS and (np.diff(x) > 0.0).all()
+    save(figure, tmp_path / "one", "x")
+    assert ",31.237,7\n" in (tmp_path / "one.csv").read_text()
 
 
 def test_black_and_a_light_colour_are_told_apart_without_another_line():

@@ -151,6 +151,18 @@ def test_a_step_of_the_soft_joint_settles_with_the_open_valve_and_does_not_overs
         assert row.figures["overshoot_pa"] < 4e3
 
 
+def test_a_pressure_that_is_never_reached_is_missed_even_if_the_open_valve_does_not_reach_it(
+    pressure,
+):
+    """As from a supply below the target: it had been told as met, and `check` answered 0."""
+    low = PLANTS["soft_joint"]().with_values({"supply.pressure_pa": 3.9e5})
+    found = check_followed(low, {"pressure": pressure}, ["ekf"], ["2-3"])
+    (row,), (told,) = found.rows, [line for line in found.text.splitlines() if "never" in line]
+
+    assert np.isinf(row.figures["settling_s"]) and np.isinf(row.asked["settling_s"])
+    assert not row.reached and told.split()[6] == "no"
+
+
 def test_the_rig_follows_one_hertz_within_a_twentieth_of_the_amplitude():
     plant = PLANTS["crr_rig"]()
     made = {"lq": design("axis-lq", plant).controller}

@@ -10,6 +10,7 @@ from test_report import UNITS, diagnosis
 from studies.documents import diagnosis_document
 from studies.figures.diagnosis import diagnosis_figures, missing_term_figure
 from studies.figures.style import styled
+from studies.page.missing_term import _dependence as on_page
 from studies.text_of_results import diagnosis_text
 from workbench.diagnosis.dependence import (
     dependences,
@@ -207,6 +208,35 @@ def test_a_missing_force_is_always_drawn_against_velocity_and_a_flow_against_a_c
     assert drawn("slide.momentum", "force_n")[-1] == "slide velocity (m/s)"
     assert drawn("chamber_a.mass", "mass_flow_kg_s")[-1] == "valve command (V)"
     assert len(drawn("slide.momentum", "force_n")) == 3
+
+
+@pytest.mark.parametrize(
+    ("balance", "term", "names", "label"),
+    [
+        ("bellows.mass", "mass_flow_kg_s", ["valve.pwm"], "valve pwm"),
+        ("joint.momentum", "torque_n_m", ["joint.velocity_rad_s"], "joint velocity (deg/s)"),
+        ("bellows.mass", "mass_flow_kg_s", ["rate of valve.pwm"], "rate of valve pwm (1/s)"),
+        ("bellows.mass", "mass_flow_kg_s", ["rate of valve.command_v"],
+         "rate of valve command (V/s)"),
+    ],
+)  # fmt: skip
+def test_so_it_is_on_plants_whose_valve_has_no_volts_and_whose_joint_turns(
+    balance, term, names, label
+):
+    """Four that explain more stand before it; a rate alone is no command."""
+    where, bins = diagnosis().where, np.array([[0.0, 1.0], [1.0, 2.0], [0.1, 0.1]])
+    rate = names[0].startswith("rate of ")
+    others = [f"chamber_{k}.pressure_pa" for k in range(4)]
+    against = tuple(Dependence(n, 0.5, bins) for n in (names + others if rate else others + names))
+    found = replace(where, balance=balance, term_name=term, against=against)
+
+    drawn = [axes.get_xlabel() for axes in missing_term_figure(found).axes[2:]]
+    assert len(drawn) == 3 and label in drawn
+    pytest.importorskip("bokeh", reason="the page needs bokeh (extra `page`)")
+    (shown,) = [d for d in against if d.variable == names[0]]
+    chart = on_page(shown, 1.0, "l/min")
+    assert chart.xaxis.axis_label == label
+    assert chart.title.text == f"follows {label.partition(' (')[0]}: 50 %"
 
 
 def test_what_is_not_known_of_a_missing_term_has_no_line():

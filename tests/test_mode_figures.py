@@ -1,10 +1,15 @@
 """Figures of modes in time: what is drawn is what the modes do."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
+from linearize.cuts import Interval
 from linearize.hybrid_simulation import sampled_hybrid
+from linearize.modes import hybrid_modes
 from linearize.standard import COMMAND, POSITION, VELOCITY, standard_modes
+from studies.figures.modes import MARKERS, pole_figure
 from studies.figures.prediction import placement_figure, point_figure
 from studies.mode_pictures import STEP_S, map_figure, step_figure, step_of
 from workbench.plants.servo_drive import servo_drive
@@ -75,3 +80,17 @@ def test_every_pole_is_in_the_map_of_its_kind(hybrid):
 
     counts = [len(axes.collections[0].get_offsets()) for axes in figure.axes[:3]]
     assert counts == [36, 18, 36]
+
+
+def test_poles_of_more_regions_than_there_are_markers_are_all_drawn_and_told_apart():
+    """As of a file of cuts with many intervals."""
+    ends = [-np.inf, *(0.025 * k for k in range(1, len(MARKERS) + 2)), np.inf]
+    parts = [
+        Interval(f"part {k}", low, high, point=0.025 * k + 0.01)
+        for k, (low, high) in enumerate(pairwise(ends))
+    ]
+    figure = pole_figure(hybrid_modes(servo_drive(), {POSITION: parts}))
+
+    drawn = [line for axes in figure.axes for line in axes.lines if len(line.get_xdata()) > 2]
+    assert [line.get_label() for line in drawn] == [part.label for part in parts]
+    assert len({(line.get_marker(), line.get_color()) for line in drawn}) == len(parts)

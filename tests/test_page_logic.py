@@ -13,9 +13,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from page_files import drive_files
 
+from studies.figures.decimation import peaks
 from studies.page import tasks
 from studies.page.balance_terms import terms_of
-from studies.page.decimation import peaks
 from studies.page.jobs import STOPPED, Job
 from studies.page.missing_term import in_people
 from studies.page.replay import script

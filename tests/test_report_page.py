@@ -50,11 +50,27 @@ def test_a_page_holds_its_figures_and_needs_no_network(page):
 
 
 def test_names_inside_a_page_are_its_own(page):
-    names = re.findall(r'\bid="([^"]+)"', page.read_text())
-    used = re.findall(r'href="#([^"]+)"|url\(#([^)]+)\)', page.read_text())
+    assert_own_names(page.read_text())
+
+
+def test_a_figure_of_a_recording_with_an_odd_name_is_whole_and_does_no_harm(figures, tmp_path):
+    """A browser ends a reference at the first bracket and an attribute at the first quote."""
+    for name in ("run_(1)", "run_[1]", 'a" onload="alert(1)', "<b>"):
+        save(figures["poles"], tmp_path / name, "workbench compare")
+
+    text = render_folder(tmp_path).read_text()
+    assert_own_names(text)
+    assert "onload=" not in text.replace("onload=&#34;", "") and "<b>" not in text
+
+
+def assert_own_names(text):
+    """Every name once, and every reference to one of them."""
+    names = re.findall(r'\bid="([^"]+)"', text)
+    used = re.findall(r'href="#([^"]+)"|url\(#([^)]+)\)', text)
 
     assert len(names) == len(set(names))
     assert {a or b for a, b in used} <= set(names)
+    assert not any(set(name) & set("()<> ") for name in names)
 
 
 def test_a_page_can_be_made_again_from_its_folder(page):
@@ -93,6 +109,15 @@ def test_a_report_of_others_is_refused(tmp_path):
 
     with pytest.raises(InputError, match="no report of ours"):
         render_folder(tmp_path)
+
+
+@pytest.mark.parametrize("content", [b"", b"\xff\xfe picture"])
+def test_a_figure_that_is_no_svg_is_named(tmp_path, content):
+    (tmp_path / "empty.svg").write_bytes(content)
+
+    with pytest.raises(InputError, match=r"empty\.svg: is no SVG file"):
+        render_folder(tmp_path)
+    assert not (tmp_path / "report.html").exists()
 
 
 def test_steps_of_the_page_are_told_in_the_words_of_their_commands(tmp_path):

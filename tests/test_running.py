@@ -6,6 +6,7 @@ from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 
+import numpy as np
 import pytest
 from commands import call
 
@@ -90,6 +91,16 @@ def test_what_other_code_or_another_extent_has_finished_is_run_again(studies, tm
     all_of(good, tmp_path, Extent.FULL)
 
     assert [extent for _, extent, _ in DONE] == [Extent.QUICK, Extent.FULL]
+
+
+def test_numbers_that_json_does_not_know_are_null(tmp_path):
+    """As the median over draws of which most are lost: other programs refuse ``Infinity``."""
+    found = {"medians": {"rise (ms)": np.float64("inf")}, "ends": (np.nan, 2.0), "plants": 3}
+    study = Study("odd", "?", "-", lambda *_: Outcome("", (), {}, found))
+    run_study(study, tmp_path, Extent.QUICK, "workbench study odd", print, print)
+
+    told = json.loads((tmp_path / "study.json").read_text(), parse_constant=pytest.fail)
+    assert told["numbers"] == {"medians": {"rise (ms)": None}, "ends": [None, 2.0], "plants": 3}
 
 
 def test_a_study_among_several_keeps_to_its_own_process(studies, tmp_path):

@@ -1,5 +1,7 @@
 """A check of shifts shows the open loop that its bounds come from, in table and figure."""
 
+from math import isinf
+
 import pytest
 
 from studies.checking import styled_figures
@@ -26,6 +28,15 @@ def test_time_and_impact_of_the_open_loop_stand_beside_the_bounds_that_follow_fr
     assert all(name in head for name in ("bound of time ms", "open loop ms", "open loop m/s"))
     assert len({*HEAD}) == len(HEAD) == len(first.split()) - 2  # two wall times follow
     assert told == BOUNDS and "1.25 times the time of the open loop" in told
+
+
+def test_a_shift_that_never_ends_is_not_made_even_if_the_open_loop_does_not_make_it():
+    """A piston too heavy for its supply: whoever sent nothing had been told that it is reached."""
+    heavy = gearbox().with_values({"main_piston.mass_kg": 20.0})
+    (row,) = check_shifts(heavy, {"idle": Drive((0, 0))}, ["n-l"]).rows
+
+    assert isinf(row.settling_s) and isinf(row.longest_s)
+    assert row.impact_m_s == 0.0 and not row.reached
 
 
 def test_the_open_loop_is_drawn_once_thin_and_grey_with_a_word_in_the_legend(found):

@@ -19,7 +19,7 @@ from typer.core import TyperCommand, TyperOption
 if TYPE_CHECKING:
     from studies.workers import Workers
 
-DONE, NO, WRONG_INPUT, SOLVER_FAILED, STOPPED = 0, 1, 2, 3, 130
+DONE, NO, WRONG_INPUT, SOLVER_FAILED, STOPPED, UNREAD = 0, 1, 2, 3, 130, 141
 DEBUG = "WORKBENCH_DEBUG"  # set to anything, what is unforeseen is shown in full
 
 app = typer.Typer(
@@ -104,6 +104,8 @@ def answering(quiet: bool = False) -> Iterator[Callable[[str], None]]:
         _stop(str(error), SOLVER_FAILED)
     except ValueError as error:
         _stop(str(error.args[0]) if error.args else repr(error), WRONG_INPUT)
+    except BrokenPipeError:
+        _unread()
     except OSError as error:
         _stop(f"{error.filename or ''}: {error.strerror or error}".lstrip(": "), WRONG_INPUT)
     except KeyboardInterrupt:
@@ -173,6 +175,15 @@ def _linear_algebra_error() -> type[Exception]:
     """Numpy's error, only where numpy is loaded: nothing else can raise it."""
     numpy = sys.modules.get("numpy")
     return numpy.linalg.LinAlgError if numpy else ArithmeticError
+
+
+def _unread() -> None:
+    """End as a shell expects it where the reader has enough, as behind ``| head``: without a word.
+
+    What is still to be flushed goes nowhere, or Python would complain of it in the end.
+    """
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    raise typer.Exit(UNREAD)
 
 
 def _stop(message: str, code: int) -> None:

@@ -12,16 +12,21 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from workbench.recording import Recording
 
+ANOTHER = "the name of another file to write"
+TAKEN = "is a file that this command writes besides"
+
 
 def writable(
     *files: Path | None,
     folders: Iterable[Path | None] = (),
     reads: Iterable[Path | None] = (),
+    besides: Iterable[Path | None] = (),
 ) -> None:
     """Refuse, before any work, a file or a folder that could not be written in the end.
 
     ``reads`` are the files that the command reads and that are not to be written over: a slip of
-    the hand must not cost a recording.
+    the hand must not cost a recording.  Nor must one result cost another: ``besides`` are files
+    that the command writes too.
 
     Raises
     ------
@@ -30,17 +35,23 @@ def writable(
     """
     from workbench.errors import InputError, Message
 
-    wrong, read = [], [*filter(None, reads)]
+    wrong, read, written = [], [*filter(None, reads)], [*filter(None, besides)]
     for path in filter(None, files):
         if any(_same(path, other) for other in read):
             what = "is a file that this command reads"
-            wrong.append(Message(what, str(path), "the name of another file to write"))
+            wrong.append(Message(what, str(path), ANOTHER))
         elif path.is_dir():
             wrong.append(Message("is a folder", str(path), "the name of a file to write"))
+        elif any(_below(path, other) or _below(other, path) for other in written):
+            wrong.append(Message(TAKEN, str(path), ANOTHER))
         else:
             wrong += _no_folder(path, path.parent)
+            written.append(path)
     for path in filter(None, folders):
-        wrong += _no_folder(path, path)
+        if any(_below(path, other) for other in written):
+            wrong.append(Message(TAKEN, str(path), "a folder to write into"))
+        else:
+            wrong += _no_folder(path, path)
     if wrong:
         raise InputError(*wrong)
 
@@ -51,6 +62,12 @@ def _same(path: Path, other: Path) -> bool:
         return path.samefile(other)
     except OSError:
         return False
+
+
+def _below(path: Path, other: Path) -> bool:
+    """Whether a name stands for the file of another one, or lies below it as below a folder."""
+    whole, above = path.resolve(), other.resolve()
+    return above in (whole, *whole.parents)
 
 
 def _no_folder(path: Path, folder: Path) -> list[Any]:

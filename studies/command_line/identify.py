@@ -72,8 +72,8 @@ def identify(
             raise InputError(Message("needs recordings", procedure, chosen.manoeuvre))
         if into and not output:
             raise InputError(Message("writes nothing without -o", "--into", "-o FILE"))
-        writable(output, folders=[figures], reads=recordings)
-        writable(json, reads=[rig, into, *recordings])
+        writable(output, reads=recordings)
+        writable(json, folders=[figures], reads=[rig, into, *recordings], besides=[output])
         known, other = load_rig(rig), load_rig(into) if into else None
         read = read_all(known, recordings, say)
         say(f"identifying {chosen.gives}")

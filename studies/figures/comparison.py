@@ -79,15 +79,16 @@ def overlay_figure(each: RecordingComparison) -> Figure:
 
 def _draw_overlay(axes: Axes, each: RecordingComparison, name: str) -> None:
     to_people = display_scale(name).from_si
-    time_s, measured = thinned(each.time_s, each.measured[name])
-    axes.plot(time_s, to_people(measured), "-", color=GREY, linewidth=2.0, label="measured")
+    measured = to_people(each.measured[name])
+    drawn = thinned(each.time_s, measured)
+    axes.plot(*drawn, "-", color=GREY, linewidth=2.0, label="measured")
     for horizon in OVERLAID:
         if horizon in each.simulated:
             style, colour = LINES[horizon]
-            (simulated,) = thinned(each.simulated[horizon][name])
-            axes.plot(time_s, to_people(simulated), linestyle=style, color=colour, label=horizon)
+            drawn = thinned(each.time_s, to_people(each.simulated[horizon][name]))
+            axes.plot(*drawn, linestyle=style, color=colour, label=horizon)
     axes.set_ylabel(labelled(name).replace(" (", "\n("))
-    _hold_range(axes, to_people(measured))
+    _hold_range(axes, measured)
 
 
 def _hold_range(axes: Axes, measured: np.ndarray) -> None:

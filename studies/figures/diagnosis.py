@@ -18,7 +18,7 @@ from studies.figures.style import (
     styled,
     thinned,
 )
-from studies.text import labelled
+from studies.text import RATE, labelled
 from workbench.diagnosis.result import DecidedBy
 from workbench.units import display_scale, display_unit, public_name
 
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from workbench.diagnosis.result import Diagnosis, Ranked, Where
 
 SHOWN, SHOWN_BALANCES, SHOWN_DRIVERS = 10, 8, 3
+SPEEDS, COMMANDS = ("velocity_m_s", "velocity_rad_s"), (".command", ".pwm")  # ends of names
 HOLLOW = {"color": "white", "edgecolor": GREY, "hatch": "....", "linewidth": 0.6}
 SAID = 0.02  # of the variance of a missing term: less that parameters explain is not said
 
@@ -121,16 +122,16 @@ def _panels(where: Where) -> list[Dependence]:
     drawable = [each for each in where.against if each.bins.shape[1]]
     strongest = drawable[:SHOWN_DRIVERS]
     place, _, kind = where.balance.rpartition(".")
-    force, velocity = kind == "momentum", f"{place}.velocity_m_s"
+    force, velocity = kind == "momentum", [f"{place}.{speed}" for speed in SPEEDS]
     names = [each.variable for each in drawable]
-    usual = next((n for n in names if (n == velocity if force else _is_command(n))), None)
+    usual = next((n for n in names if (n in velocity if force else _is_command(n))), None)
     if usual is None or usual in names[:SHOWN_DRIVERS]:
         return strongest
     return [*strongest[:-1], drawable[names.index(usual)]]
 
 
 def _is_command(variable: str) -> bool:
-    return ".command" in variable and not variable.startswith("rate of ")
+    return any(word in variable for word in COMMANDS) and not variable.startswith(RATE)
 
 
 def _term(where: Where) -> tuple[float, str]:
@@ -145,10 +146,10 @@ def _draw_term(axes: Axes, where: Where) -> None:
     time_s, term, spread = thinned(where.time_s, factor * where.term, factor * where.term_deviation)
     axes.fill_between(time_s, term - spread, term + spread, color=BLUE, alpha=0.2, linewidth=0)
     if where.intensities:
-        (other,) = thinned(factor * where.intensities.term)
+        other = thinned(where.time_s, factor * where.intensities.term)
         softer = where.intensities.neighbour < where.intensities.likeliest
         label_other = f"walk {'slower' if softer else 'faster'} than the likeliest"
-        axes.plot(time_s, other, color=ORANGE, linewidth=0.6, linestyle="--", label=label_other)
+        axes.plot(*other, color=ORANGE, linewidth=0.6, linestyle="--", label=label_other)
     axes.plot(time_s, term, color=BLUE, linewidth=0.6, label="missing term, one deviation shaded")
     axes.set_xlabel("time (s)")
     axes.set_ylabel(label)
@@ -174,9 +175,7 @@ def _draw_balances(axes: Axes, where: Where) -> None:
 def _draw_dependence(axes: Axes, where: Where, dependence: Dependence) -> None:
     factor, label = _term(where)
     name = dependence.variable
-    rated = name.startswith("rate of ")
-    plain = name.removeprefix("rate of ")
-    per = 1.0 / display_scale(plain).factor
+    per = 1.0 / display_scale(name.removeprefix(RATE)).factor
     centres, means, spreads = dependence.bins * np.array([[per], [factor], [factor]])
     band = {"color": BLUE, "alpha": 0.2, "linewidth": 0, "label": "one deviation in each bin"}
     axes.fill_between(centres, means - spreads, means + spreads, **band)
@@ -188,8 +187,7 @@ def _draw_dependence(axes: Axes, where: Where, dependence: Dependence) -> None:
         if dependence.neighbour is not None:
             axes.plot(centres, factor * dependence.neighbour, "--", color=ORANGE)
     axes.axhline(0.0, color=GREY, linewidth=0.6)
-    shown = labelled(plain)
-    axes.set_xlabel(f"rate of {shown[:-1]}/s)" if rated else shown)
+    axes.set_xlabel(labelled(name))
     axes.set_ylabel(label)
     axes.locator_params(axis="x", nbins=4)
     also = f", a loop {100.0 * loop.adds:.0f} % more" if loop else ""

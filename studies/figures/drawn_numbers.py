@@ -155,8 +155,10 @@ def _unlabelled(axes: Axes, x: list, y: list) -> str:
 
 def _curves(axes: Axes) -> Iterator[tuple[str, list, list]]:
     """Label, x and y of each line, cell of a map, point cloud and group of bars."""
-    for line in axes.lines:
-        yield str(line.get_label()), list(line.get_xdata()), list(line.get_ydata())
+    spread = {each.lines[0]: each for each in axes.containers if hasattr(each, "has_yerr")}
+    for line in axes.lines:  # of points with error bars the label is that of both together
+        label = spread.get(line, line).get_label()
+        yield str(label), list(line.get_xdata()), list(line.get_ydata())
     for mesh in axes.collections:
         if hasattr(mesh, "get_coordinates"):
             yield from _cells(mesh)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from studies.closed_loop_figures import by_scenario
-from studies.figures.style import GREY, PAGE_IN, new_figure
+from studies.figures.style import GREY, PAGE_IN, look, new_figure
 from studies.following_check import FollowingCheck
 from studies.text import labelled
 from workbench.units import display_scale, display_unit
@@ -36,8 +36,8 @@ def _figure(runs: dict[str, LoopRecord]) -> Figure:
         _draw_signal(panels[2 * k], runs, name)
         _draw_error(panels[2 * k + 1], runs, name)
     for axes, name in zip(panels[2 * len(followed) :], commands, strict=True):
-        for run, record in runs.items():
-            axes.step(first.time_s, record.recording[name], where="post", label=run)
+        for k, (run, record) in enumerate(runs.items()):
+            axes.step(first.time_s, record.recording[name], where="post", label=run, **look(k))
         axes.set_ylabel(_lines(labelled(name)))
     panels[-1].set_xlabel("time (s)")
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
@@ -50,7 +50,7 @@ def _draw_signal(axes: Axes, runs: dict[str, LoopRecord], name: str) -> None:
         if k == 0:
             wanted = unit.from_si(recording[REFERENCE + name])
             axes.plot(recording.time_s, wanted, color=GREY, linestyle="-", label="reference")
-        axes.plot(recording.time_s, unit.from_si(recording[name]), color=f"C{k}", label=run)
+        axes.plot(recording.time_s, unit.from_si(recording[name]), label=run, **look(k))
     axes.set_ylabel(_lines(labelled(name)))
 
 
@@ -58,7 +58,7 @@ def _draw_error(axes: Axes, runs: dict[str, LoopRecord], name: str) -> None:
     for k, (run, record) in enumerate(runs.items()):
         recording = record.recording
         error = (recording[name] - recording[REFERENCE + name]) / display_scale(name).factor
-        axes.plot(recording.time_s, error, color=f"C{k}", label=run)
+        axes.plot(recording.time_s, error, label=run, **look(k))
     axes.set_ylabel(f"error\n({display_unit(name)})")
     axes.set_label(f"error of {labelled(name)}")  # in the table
 

@@ -164,8 +164,8 @@ def wall_heat_figure(found: WallHeatFit) -> Figure:
                 (exponential, "exponential", ORANGE, "--"),
                 (law, "heat law", BLUE, ":"),
             ):
-                (fitted,) = thinned(curve.fitted)
-                upper.plot(time_s, fitted / PA_PER_BAR, linestyle=style, color=colour, label=name)
+                fitted = thinned(law.along, curve.fitted / PA_PER_BAR)
+                upper.plot(*fitted, linestyle=style, color=colour, label=name)
                 smooth = np.convolve(curve.residual, np.ones(SMOOTHED) / SMOOTHED, mode="valid")
                 middle = law.along[SMOOTHED // 2 :][: len(smooth)]
                 lower.plot(*thinned(middle, smooth), linestyle=style, color=colour)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import cycle
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 
 SINGLE_MAPS = 64  # more modes have no map each
 ACROSS, LETTERS = 6, 26  # maps side by side, and letters of a line above one
+MOST_BESIDE = 6  # labels of a line of the legend
 MARKERS = ("o", "s", "^", "D", "v", "x")
 COLOURS = (BLUE, RED, GREEN, ORANGE)
 
@@ -32,7 +34,8 @@ def pole_figure(hybrid: HybridModel) -> Figure:
         figure = new_figure(PAGE_IN, 2.6)
         axes = figure.subplots(1, len(panels), sharex=True, sharey=True, squeeze=False)[0]
         for panel, label in zip(axes, panels, strict=True):
-            for kind, marker, colour in zip(kinds, MARKERS, COLOURS * 2, strict=False):
+            looks = zip(cycle(MARKERS), cycle(COLOURS))  # 12 that differ
+            for kind, (marker, colour) in zip(kinds, looks, strict=False):
                 chosen = [
                     mode
                     for mode in hybrid.modes
@@ -59,7 +62,8 @@ def pole_figure(hybrid: HybridModel) -> Figure:
         for panel in axes:
             handles, labels = panel.get_legend_handles_labels()
             named |= dict(zip(labels, handles, strict=True))
-        figure.legend(named.values(), named.keys(), loc="outside lower center", ncols=len(named))
+        columns = min(len(named), MOST_BESIDE)
+        figure.legend(named.values(), named.keys(), loc="outside lower center", ncols=columns)
     return figure
 
 

@@ -10,10 +10,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from studies.figures.decimation import peaks
 from studies.figures.drawn_numbers import write_drawn
 from workbench.whole_file import whole_file
 
@@ -23,10 +24,11 @@ if TYPE_CHECKING:
 COLUMN_IN, PAGE_IN = 3.5, 7.16
 BLUE, ORANGE, GREEN, RED = "#0072B2", "#E69F00", "#009E73", "#D55E00"
 PURPLE, SKY, BLACK, GREY = "#CC79A7", "#56B4E9", "#000000", "0.6"
-MOST_POINTS = 2000  # of a curve; more are not seen and swell the files
+MOST_POINTS = 2000  # of a curve, and as many peaks; more are not seen and swell the files
 
 _COLOURS = (BLUE, RED, GREEN, ORANGE, PURPLE, SKY, BLACK)
 LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1)), (0, (3, 1)), (0, (1, 1)))
+TURN = 4  # of the kinds of lines, once all colours were there: neighbours differ in grey, too
 
 
 @contextmanager
@@ -68,10 +70,26 @@ def new_figure(width_in: float, height_in: float) -> Figure:
     return Figure(figsize=(width_in, height_in), layout="constrained")
 
 
-def thinned(*columns: np.ndarray) -> list[np.ndarray]:
-    """Columns of equal length with no more points than can be seen."""
-    every = max(len(columns[0]) // MOST_POINTS, 1)
-    return [column[::every] for column in columns]
+def kind_of_line(k: int) -> Any:
+    """Of the k-th of many lines in colours of the cycle: no two of the first 49 are alike."""
+    return LINES[(k + TURN * (k // len(LINES))) % len(LINES)]
+
+
+def look(k: int) -> dict[str, Any]:
+    """Colour and kind of the k-th of many lines."""
+    return {"color": f"C{k}", "linestyle": kind_of_line(k)}
+
+
+def thinned(x: np.ndarray, *rows: np.ndarray) -> list[np.ndarray]:
+    """A long row and others over it, (n,) each, with no more points than can be seen.
+
+    The smallest and the largest of every stretch stay: an impact is shorter than a stretch.
+    """
+    every = max(len(x) // MOST_POINTS, 1)
+    if every == 1:
+        return [x, *rows]
+    kept = np.union1d(np.arange(0, len(x), every), peaks(np.array(rows), 0, len(x), MOST_POINTS))
+    return [each[kept] for each in (x, *rows)]
 
 
 def save_all(figures: Mapping[str, Figure], folder: Path, command: str) -> list[Path]:

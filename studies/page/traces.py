@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from studies.page.decimation import MOST_POINTS, peaks
+from studies.figures.decimation import MOST_POINTS, peaks
 
 if TYPE_CHECKING:
     from bokeh.document import Document

@@ -54,7 +54,7 @@ def render_folder(folder: Path) -> Path:
     Raises
     ------
     InputError
-        If there is neither, or the report.json is none of ours.
+        If there is neither, the report.json is none of ours, or a figure is no SVG.
     """
     import jinja2
 
@@ -100,14 +100,23 @@ def _drawn(folder: Path, name: str) -> dict[str, str]:
     said = command.read_text(encoding="utf-8").strip() if command.is_file() else ""
     beside = [p for p in map(svg.with_suffix, ENDINGS) if p.is_file()]
     files = ", ".join(path.relative_to(folder).as_posix() for path in beside)
-    drawn = inline(svg.read_text(encoding="utf-8"), name)
+    try:
+        drawn = inline(svg.read_text(encoding="utf-8"), name)
+    except ValueError as error:  # of bytes that are no text, too
+        raise InputError(Message("is no SVG file", file=str(svg))) from error
     return {"svg": drawn, "files": files, "command": said}
 
 
 def inline(svg: str, name: str) -> str:
-    """The SVG element alone, with names of its own: a page holds several."""
+    """The SVG element alone, with names of its own: a page holds several.
+
+    Raises
+    ------
+    ValueError
+        If there is no such element.
+    """
     bare = re.sub(r"<metadata>.*?</metadata>", "", svg[svg.index("<svg") :], flags=re.DOTALL)
-    name = name.replace("/", "-")
+    name = re.sub(r"[^\w-]", lambda odd: f"-{ord(odd[0]):x}-", name)  # no quote, no bracket
     own = re.sub(r'\bid="', f'id="{name}-', bare)
     own = re.sub(r'href="#', f'href="#{name}-', own)
     return re.sub(r"url\(#", f"url(#{name}-", own)

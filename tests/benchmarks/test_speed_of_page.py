@@ -6,7 +6,7 @@ The floor is what numpy needs to look at the same numbers once, in the same run.
 import numpy as np
 import pytest
 
-from studies.page.decimation import peaks
+from studies.figures.decimation import peaks
 from studies.page.traces import TIME, Traces, inside
 
 N, ROWS = 600_000, 9

@@ -1,4 +1,4 @@
-"""Fewer points of long rows, so that a browser draws them at once, with every peak kept.
+"""Fewer points of long rows, so that they are drawn at once, with every peak kept.
 
 A stretch of samples becomes those at which any row is smallest or largest in it.  So all rows keep
 the same samples, and what is selected in one picture lights up in all.
