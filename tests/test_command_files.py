@@ -117,6 +117,46 @@ def test_identify_writes_over_no_recording(folder, monkeypatch):
         assert f"{words[1]}: is a file that this command reads" in answer.stderr
 
 
+ONTO_ANOTHER_RESULT = [
+    ("compare", ["run.csv", "--json", "new", "--figures", "new"], "new"),
+    ("compare", ["run.csv", "--json", "new", "--figures", "new/figures"], "new"),
+    ("diagnose", ["run.csv", "--json", "new", "--figures", "./new"], "new"),
+    ("improve", [*HELD_OUT, "-o", "new.toml", "--json", "./new.toml"], "new.toml"),
+    ("improve", [*HELD_OUT, "-o", "new.toml", "--json", "new", "--report", "new"], "new"),
+    ("modes", ["--json", "new", "--export", "new"], "new"),
+    ("design", ["--controller", "lq", "-o", "new.toml", "--json", "new.toml"], "new.toml"),
+    ("check", ["commands.csv", "--json", "new", "--keep", "new"], "new"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("command", "words", "named"), ONTO_ANOTHER_RESULT)
+def test_no_result_takes_the_place_of_another(folder, monkeypatch, command, words, named):
+    monkeypatch.chdir(folder)
+    before = {*folder.iterdir()}
+
+    answer = call(command, "rig.toml", *words)
+
+    assert answer.exit_code == 2
+    told = f"{named}: is to hold another result too; expected a name of its own"
+    assert answer.stderr == f"workbench: {told}\n"
+    assert {*folder.iterdir()} == before
+
+
+def test_identify_writes_values_and_rig_into_files_of_their_own(folder, monkeypatch):
+    monkeypatch.chdir(folder)
+
+    answer = call(
+        "identify", "friction", "rig.toml", "run.csv", "-o", "new.toml", "--json", "new.toml"
+    )
+
+    assert answer.exit_code == 2
+    assert "new.toml: is to hold another result too" in answer.stderr
+
+
+def test_a_result_may_stand_in_the_folder_of_the_others(tmp_path):
+    writable(tmp_path / "figures" / "errors.json", folders=[tmp_path / "figures"])
+
+
 def test_a_rig_may_be_bettered_in_its_own_file(folder):
     rig, recording = folder / "rig.toml", folder / "run.csv"
 

@@ -17,11 +17,13 @@ def writable(
     *files: Path | None,
     folders: Iterable[Path | None] = (),
     reads: Iterable[Path | None] = (),
+    besides: Iterable[Path | None] = (),
 ) -> None:
     """Refuse, before any work, a file or a folder that could not be written in the end.
 
     ``reads`` are the files that the command reads and that are not to be written over: a slip of
-    the hand must not cost a recording.
+    the hand must not cost a recording.  ``besides`` are other files and folders that it writes: of
+    two results with one name the later would take the place of the earlier.
 
     Raises
     ------
@@ -30,19 +32,28 @@ def writable(
     """
     from workbench.errors import InputError, Message
 
-    wrong, read = [], [*filter(None, reads)]
-    for path in filter(None, files):
+    files, folders = [*filter(None, files)], [*filter(None, folders)]
+    wrong, read, written = [], [*filter(None, reads)], [*folders, *filter(None, besides)]
+    for k, path in enumerate(files):
         if any(_same(path, other) for other in read):
             what = "is a file that this command reads"
             wrong.append(Message(what, str(path), "the name of another file to write"))
         elif path.is_dir():
             wrong.append(Message("is a folder", str(path), "the name of a file to write"))
+        elif any(_holds(path, other) for other in (*files[:k], *written)):
+            wrong.append(Message("is to hold another result too", str(path), "a name of its own"))
         else:
             wrong += _no_folder(path, path.parent)
-    for path in filter(None, folders):
+    for path in folders:
         wrong += _no_folder(path, path)
     if wrong:
         raise InputError(*wrong)
+
+
+def _holds(path: Path, other: Path) -> bool:
+    """Whether a file is where another result is to be, or the folder of one."""
+    own, its = path.resolve(), other.resolve()
+    return own == its or own in its.parents or _same(path, other)
 
 
 def _same(path: Path, other: Path) -> bool:

@@ -73,7 +73,7 @@ def identify(
         if into and not output:
             raise InputError(Message("writes nothing without -o", "--into", "-o FILE"))
         writable(output, folders=[figures], reads=recordings)
-        writable(json, reads=[rig, into, *recordings])
+        writable(json, reads=[rig, into, *recordings], besides=[output, figures])
         known, other = load_rig(rig), load_rig(into) if into else None
         read = read_all(known, recordings, say)
         say(f"identifying {chosen.gives}")

@@ -143,7 +143,7 @@ def improve(
         from workbench.rig_writing import write_rig
 
         writable(output, folders=[report], reads=[*train, *(validate or ())])
-        writable(json, reads=[rig, *train, *(validate or ())])
+        writable(json, reads=[rig, *train, *(validate or ())], besides=[output, report])
         known = load_rig(rig)
         read, held_out = read_to_fit(known, train, say), read_all(known, validate, say)
         found = improve_rig(known, read, held_out, say, law)
