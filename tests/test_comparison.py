@@ -25,6 +25,7 @@ from workbench.comparison.horizons import lost
 from workbench.comparison.regimes import regimes, shares
 from workbench.comparison.run import run
 from workbench.errors import InputError
+from workbench.reading import RecordingWarning
 from workbench.recording import Recording
 from workbench.rig import default_rig
 
@@ -40,9 +41,11 @@ def commands(n=600):
     return Recording("manoeuvre", DT, {"valve.command_v": command})
 
 
-def measured(rig):
-    """The rig's outputs under the commands with seeded noise, as a recording."""
-    clean, rng = run(rig, commands()), np.random.default_rng(3)
+def measured(rig, times=1):
+    """The rig's outputs under the commands, so many times, with seeded noise, as a recording."""
+    once = commands()
+    played = {name: np.tile(values, times) for name, values in once.channels.items()}
+    clean, rng = run(rig, replace(once, channels=played)), np.random.default_rng(3)
     noisy = {n: clean[n] + s * rng.standard_normal(len(clean)) for n, s in NOISE.items()}
     kept = {"valve.command_v": clean["valve.command_v"], **noisy}
     return replace(clean, channels=kept, noise=NOISE)
@@ -156,6 +159,21 @@ def test_pieces_of_a_split_recording_start_anew(drive, recording):
 
     assert found.errors[FREE_RUN][PRESSURE].rmse < 10 * NOISE[PRESSURE]
     assert found.notes[0].startswith("2 pieces stand one behind the other, from 0, 0.3 s on")
+
+
+def test_samples_of_a_saturated_sensor_count_in_no_error(drive):
+    """The plant that made the recording is up to a bar off where the sensor ends."""
+    recording = measured(drive, times=3)
+    top = float(np.quantile(recording[PRESSURE], 0.7))
+    clipped = {**recording.channels, PRESSURE: np.minimum(recording[PRESSURE], top)}
+
+    with pytest.warns(RecordingWarning, match="saturated at"):
+        found = compare(drive, [replace(recording, channels=clipped)]).recordings[0]
+
+    assert np.array_equal(np.isnan(found.measured[PRESSURE]), recording[PRESSURE] >= top)
+    for horizon in (ONE_STEP, WINDOW, FREE_RUN):
+        assert found.errors[horizon][PRESSURE].rmse < 3 * NOISE[PRESSURE]
+    assert "left out of errors" in found.notes[-1]
 
 
 def test_a_recording_shorter_than_a_window_says_so(drive, recording):

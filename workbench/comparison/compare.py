@@ -74,7 +74,8 @@ class RecordingComparison:
     worst
         Windows with the largest error, worst first.
     measured, simulated
-        Recorded outputs (n,) by full name, and what each horizon gives, NaN where nothing.
+        Recorded outputs (n,) by full name, NaN where a sensor is stuck or saturated too, and what
+        each horizon gives, NaN where nothing.
     noise
         By full output name, with where it is known from.
     residuals
@@ -124,7 +125,8 @@ class Comparison:
 def compare(rig: Rig, recordings: Sequence[Recording]) -> Comparison:
     """How well the rig's plant tells what was recorded; see the module for the horizons.
 
-    Warns of what of a recording does not fit the rig, and compares it all the same.
+    Warns of what of a recording does not fit the rig, and compares it all the same.  Samples of a
+    sensor that is stuck or saturated are no measurement, and left out as in a fit.
     """
     for recording in recordings:
         warn_beyond(rig, recording)
@@ -132,7 +134,7 @@ def compare(rig: Rig, recordings: Sequence[Recording]) -> Comparison:
 
 
 def _compared(rig: Rig, recording: Recording) -> RecordingComparison:
-    findings = warned(rig, recording)
+    recording, findings = warned(rig, recording)
     course = course_of(rig.fit_for(recording), recording)
     plant = course.plant
     noise = recorded_noise(recording, plant.measured)

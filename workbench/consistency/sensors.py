@@ -127,7 +127,7 @@ def _without_saturated(plant: Plant, recording: Recording) -> tuple[Recording, l
         if at_ends.any():
             channels[name] = np.where(at_ends, np.nan, values)
             what = saturation_text(name, values, at_ends)
-            remedy = "left out of fits and of the noise; a sensor of a wider range would tell them"
+            remedy = "left out of errors, fits and noise; a sensor of a wider range would tell them"
             found.append(_finding(Weight.DOUBT, recording, name, what, remedy))
     return replace(recording, channels=channels) if found else recording, found
 
