@@ -9,6 +9,7 @@ from studies.tables import NEVER, Table, note
 from workbench.diagnosis.result import told
 from workbench.units import display_scale, display_unit, public_name
 
+RATE = "rate of "  # before the name of a quantity
 LONG_S = 9e-3  # above, a number of microseconds has more than four digits
 
 
@@ -68,7 +69,11 @@ def spread(value: float, deviation: float, name: str, digits: int = 4) -> str:
 
 
 def labelled(name: str) -> str:
-    """A quantity in words with its unit, for an axis: ``chamber a pressure (bar)``."""
+    """A quantity in words with its unit, for an axis: ``chamber a pressure (bar)``.
+
+    The rate of a quantity has its unit per second, ``rate of valve command (V/s)``.
+    """
     unit = display_unit(name)
+    unit = f"{unit or 1}/s" if name.startswith(RATE) else unit
     words = public_name(name).replace(".", " ").replace("_", " ")
     return f"{words} ({unit})" if unit else words

@@ -209,6 +209,39 @@ def test_a_missing_force_is_always_drawn_against_velocity_and_a_flow_against_a_c
     assert len(drawn("slide.momentum", "force_n")) == 3
 
 
+def test_the_usual_panel_is_there_for_a_joint_and_for_a_duty_cycle_too():
+    where = diagnosis().where
+    bins = np.array([[0.0, 1.0], [1.0, 2.0], [0.1, 0.1]])
+    names = (
+        "cap.pressure_pa", "joint.angle_rad", "rate of valve.pwm", "valve.pwm",
+        "joint.velocity_rad_s",
+    )  # fmt: skip
+    against = tuple(Dependence(name, 0.6 - 0.1 * k, bins) for k, name in enumerate(names))
+
+    def last(balance, term):
+        found = replace(where, balance=balance, term_name=term, against=against)
+        return missing_term_figure(found).axes[-1].get_xlabel()
+
+    assert last("joint.momentum", "torque_n_m") == "joint velocity (deg/s)"
+    assert last("bellows.mass", "mass_flow_kg_s") == "valve pwm"
+
+
+@pytest.mark.parametrize(
+    ("command", "label"),
+    [
+        ("valve.command_v", "rate of valve command (V/s)"),
+        ("valve_1.command", "rate of valve 1 command (1/s)"),
+        ("valve.pwm", "rate of valve pwm (1/s)"),
+    ],
+)
+def test_the_rate_of_a_command_has_its_unit_per_second_or_one_per_second(command, label):
+    where = diagnosis().where
+    bins = np.array([[0.0, 1.0], [1.0, 2.0], [0.1, 0.1]])
+    found = replace(where, against=(Dependence(f"rate of {command}", 0.5, bins),))
+
+    assert missing_term_figure(found).axes[-1].get_xlabel() == label
+
+
 def test_what_is_not_known_of_a_missing_term_has_no_line():
     found = diagnosis()
     bare = replace(found, where=replace(found.where, against=(), by_regime={}))

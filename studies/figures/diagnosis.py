@@ -18,7 +18,7 @@ from studies.figures.style import (
     styled,
     thinned,
 )
-from studies.text import labelled
+from studies.text import RATE, labelled
 from workbench.diagnosis.result import DecidedBy
 from workbench.units import display_scale, display_unit, public_name
 
@@ -120,17 +120,20 @@ def _panels(where: Where) -> list[Dependence]:
     """What the term follows most, and the variable that engineers look for first."""
     drawable = [each for each in where.against if each.bins.shape[1]]
     strongest = drawable[:SHOWN_DRIVERS]
-    place, _, kind = where.balance.rpartition(".")
-    force, velocity = kind == "momentum", f"{place}.velocity_m_s"
-    names = [each.variable for each in drawable]
-    usual = next((n for n in names if (n == velocity if force else _is_command(n))), None)
+    names, looked_for = [each.variable for each in drawable], _looked_for(where)
+    usual = next((name for name in names if name in looked_for), None)
     if usual is None or usual in names[:SHOWN_DRIVERS]:
         return strongest
     return [*strongest[:-1], drawable[names.index(usual)]]
 
 
-def _is_command(variable: str) -> bool:
-    return ".command" in variable and not variable.startswith("rate of ")
+def _looked_for(where: Where) -> set[str]:
+    """Velocities of what a force moves; of a flow the commands, which alone have rates."""
+    place, _, kind = where.balance.rpartition(".")
+    if kind == "momentum":
+        return {f"{place}.velocity_m_s", f"{place}.velocity_rad_s"}
+    names = (each.variable for each in where.against)
+    return {name.removeprefix(RATE) for name in names if name.startswith(RATE)}
 
 
 def _term(where: Where) -> tuple[float, str]:
@@ -174,9 +177,7 @@ def _draw_balances(axes: Axes, where: Where) -> None:
 def _draw_dependence(axes: Axes, where: Where, dependence: Dependence) -> None:
     factor, label = _term(where)
     name = dependence.variable
-    rated = name.startswith("rate of ")
-    plain = name.removeprefix("rate of ")
-    per = 1.0 / display_scale(plain).factor
+    per = 1.0 / display_scale(name).factor
     centres, means, spreads = dependence.bins * np.array([[per], [factor], [factor]])
     band = {"color": BLUE, "alpha": 0.2, "linewidth": 0, "label": "one deviation in each bin"}
     axes.fill_between(centres, means - spreads, means + spreads, **band)
@@ -188,8 +189,7 @@ def _draw_dependence(axes: Axes, where: Where, dependence: Dependence) -> None:
         if dependence.neighbour is not None:
             axes.plot(centres, factor * dependence.neighbour, "--", color=ORANGE)
     axes.axhline(0.0, color=GREY, linewidth=0.6)
-    shown = labelled(plain)
-    axes.set_xlabel(f"rate of {shown[:-1]}/s)" if rated else shown)
+    axes.set_xlabel(labelled(name))
     axes.set_ylabel(label)
     axes.locator_params(axis="x", nbins=4)
     also = f", a loop {100.0 * loop.adds:.0f} % more" if loop else ""

@@ -117,13 +117,10 @@ def _over_time(where: Where, factor: float, unit: str) -> Any:
 
 def _dependence(each: Dependence, factor: float, unit: str) -> Any:
     """Means of the term in bins of one driver, without what parameters explain."""
-    rated, plain = each.variable.startswith("rate of "), each.variable.removeprefix("rate of ")
-    per = 1.0 / display_scale(plain).factor
+    per = 1.0 / display_scale(each.variable).factor
     centres, means, spreads = each.bins * np.array([[per], [factor], [factor]])
-    shown = labelled(plain)
-    label = f"rate of {shown[:-1]}/s)" if rated else shown
-    title = f"follows {_words(plain)}: {percent(each.explains)}"
-    found = chart(label, f"missing ({unit})", HEIGHT, title, tools="")
+    title = f"follows {_words(each.variable)}: {percent(each.explains)}"
+    found = chart(labelled(each.variable), f"missing ({unit})", HEIGHT, title, tools="")
     found.varea(centres, means - spreads, means + spreads, color=BLUE, alpha=0.25)
     found.line(centres, means, color=BLUE, line_width=1.5)
     found.scatter(centres, means, color=BLUE, size=5)
