@@ -24,6 +24,7 @@ from workbench.comparison.deviation import ShiftDeviation
 from workbench.comparison.horizons import lost
 from workbench.comparison.regimes import regimes, shares
 from workbench.comparison.run import run
+from workbench.consistency import examined
 from workbench.errors import InputError
 from workbench.reading import RecordingWarning
 from workbench.recording import Recording
@@ -174,6 +175,15 @@ def test_samples_of_a_saturated_sensor_count_in_no_error(drive):
     for horizon in (ONE_STEP, WINDOW, FREE_RUN):
         assert found.errors[horizon][PRESSURE].rmse < 3 * NOISE[PRESSURE]
     assert "left out of errors" in found.notes[-1]
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_slow_sensor_on_a_fast_clock_is_looked_at_without_a_word(drive, recording):
+    """Every other sample is missing: no four neighbours tell its noise."""
+    pressure_pa = np.where(np.arange(len(recording)) % 2, np.nan, recording[PRESSURE])
+    slow = replace(recording, channels={**recording.channels, PRESSURE: pressure_pa})
+
+    assert examined(drive, slow) == ()
 
 
 def test_a_recording_shorter_than_a_window_says_so(drive, recording):
