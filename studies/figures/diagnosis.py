@@ -19,7 +19,7 @@ from studies.figures.style import (
     thinned,
 )
 from studies.text import RATE, labelled
-from workbench.diagnosis.result import DecidedBy
+from workbench.diagnosis.result import DecidedBy, told
 from workbench.units import display_scale, display_unit, public_name
 
 if TYPE_CHECKING:
@@ -61,8 +61,8 @@ def ranking_figure(found: Diagnosis) -> Figure:
         axes.set_ylim(len(rows) - 0.5, -0.5)
         axes.set_xlim(0.0, 105.0)
         axes.set_xlabel("drop of the misfit beyond noise (%)")
-        told = "bold: accepted" + ("; =: cannot be told apart here" if tied else "")
-        figure.suptitle(f"{found.verdict.value.replace('_', ' ')}\n{told}", fontsize=8)
+        key = "bold: accepted" + ("; =: cannot be told apart here" if tied else "")
+        figure.suptitle(f"{found.verdict.value.replace('_', ' ')}\n{key}", fontsize=8)
         if axes.containers:
             figure.legend(loc="outside lower center", ncols=3, columnspacing=1.0)
     return figure
@@ -86,8 +86,8 @@ def _draw_drops(axes: Axes, rows: Sequence[Ranked]) -> None:
 
 
 def _bar(share: float) -> float:
-    """Length of a bar in percent: none for what makes the misfit larger."""
-    return 100.0 * max(share, 0.0)
+    """Length of a bar in percent, as it is told: none for what makes the misfit larger."""
+    return 100.0 * max(told(share), 0.0)
 
 
 def _ranked_name(name: str, tied: set[str]) -> str:
@@ -155,10 +155,10 @@ def _draw_term(axes: Axes, where: Where) -> None:
     axes.plot(time_s, term, color=BLUE, linewidth=0.6, label="missing term, one deviation shaded")
     axes.set_xlabel("time (s)")
     axes.set_ylabel(label)
-    told = f"what the balance {public_name(where.balance)} lacks"
+    title = f"what the balance {public_name(where.balance)} lacks"
     if where.imitated > SAID:
-        told += f" (below: without {100.0 * where.imitated:.0f} % that parameters may explain)"
-    axes.set_title(told)
+        title += f" (below: without {100.0 * where.imitated:.0f} % that parameters may explain)"
+    axes.set_title(title)
     _leave_room(axes, 0.25)
     axes.legend(loc="upper right", ncols=2)
 
