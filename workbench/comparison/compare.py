@@ -203,7 +203,7 @@ def _by_regime(course: Course, squared: np.ndarray) -> tuple[Regime, ...]:
 
 
 def _shifts(course: Course) -> tuple[tuple[ShiftDeviation, ...], list[str]]:
-    early = "the first shift began before the recording: its deviation is not known"
+    early = "a shift began before the recording, or a piece of it, did: its deviation is not known"
     notes = [early] if begins_energised(course) else []
     try:
         return shift_deviations(course), notes

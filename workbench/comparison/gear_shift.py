@@ -114,9 +114,9 @@ def shifts(course: Course) -> tuple[Shift, ...]:
 
 
 def begins_energised(course: Course) -> bool:
-    """True where a shift may have begun before the recording did."""
+    """True where a shift may have begun before the recording did, or a piece of it."""
     on = _energised(course)
-    return gears_of(course) is not None and bool(on.size and on[:, 0].any())
+    return gears_of(course) is not None and bool(on[:, list(course.recording.starts)].any())
 
 
 def _shift(gears: Gears, first: int, until: int, waiting: int) -> Shift | None:
