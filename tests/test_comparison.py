@@ -24,9 +24,7 @@ from workbench.comparison.deviation import ShiftDeviation
 from workbench.comparison.horizons import lost
 from workbench.comparison.regimes import regimes, shares
 from workbench.comparison.run import run
-from workbench.consistency import examined
 from workbench.errors import InputError
-from workbench.reading import RecordingWarning
 from workbench.recording import Recording
 from workbench.rig import default_rig
 
@@ -160,30 +158,6 @@ def test_pieces_of_a_split_recording_start_anew(drive, recording):
 
     assert found.errors[FREE_RUN][PRESSURE].rmse < 10 * NOISE[PRESSURE]
     assert found.notes[0].startswith("2 pieces stand one behind the other, from 0, 0.3 s on")
-
-
-def test_samples_of_a_saturated_sensor_count_in_no_error(drive):
-    """The plant that made the recording is up to a bar off where the sensor ends."""
-    recording = measured(drive, times=3)
-    top = float(np.quantile(recording[PRESSURE], 0.7))
-    clipped = {**recording.channels, PRESSURE: np.minimum(recording[PRESSURE], top)}
-
-    with pytest.warns(RecordingWarning, match="saturated at"):
-        found = compare(drive, [replace(recording, channels=clipped)]).recordings[0]
-
-    assert np.array_equal(np.isnan(found.measured[PRESSURE]), recording[PRESSURE] >= top)
-    for horizon in (ONE_STEP, WINDOW, FREE_RUN):
-        assert found.errors[horizon][PRESSURE].rmse < 3 * NOISE[PRESSURE]
-    assert "left out of errors" in found.notes[-1]
-
-
-@pytest.mark.filterwarnings("error")
-def test_a_slow_sensor_on_a_fast_clock_is_looked_at_without_a_word(drive, recording):
-    """Every other sample is missing: no four neighbours tell its noise."""
-    pressure_pa = np.where(np.arange(len(recording)) % 2, np.nan, recording[PRESSURE])
-    slow = replace(recording, channels={**recording.channels, PRESSURE: pressure_pa})
-
-    assert examined(drive, slow) == ()
 
 
 def test_a_recording_shorter_than_a_window_says_so(drive, recording):

@@ -74,18 +74,6 @@ def test_limits_tell_how_commands_move_a_plant(name, drive, axes):
     assert (found.drive, len(found.axes)) == (drive, axes)
 
 
-@pytest.mark.parametrize(
-    ("name", "recorded"),
-    [("servo_drive", (A,)), ("crr_leg", ("joint_1.angle_rad", "cap_1.pressure_pa"))],
-)
-def test_nothing_is_played_where_what_moves_is_not_recorded(name, recorded):
-    """Steps of the command, meant for a tank, drive the slide into its stops at 3.5 m/s."""
-    plant = PLANT_MODELS[name].with_measured(*recorded)
-    found = limits_of(plant, [recorded_of(plant)])
-
-    assert found.drive is Drive.UNSEEN and not library_of(found)
-
-
 def test_every_manoeuvre_keeps_to_ranges_of_commands_and_of_recorded_places(
     limits,
 ):
