@@ -209,6 +209,43 @@ def test_an_ordinary_clock_is_not_warned_of(tmp_path, factor, unit):
     read(tmp_path, text(rows), rig=RIG.replace('unit = "s"', f'unit = "{unit}"'))
 
 
+def _numbered(content: str) -> str:
+    """Row numbers in front without a name above them, as R writes a table."""
+    head, *rows = content.splitlines()
+    return "\n".join([head, *(f"{k},{row}" for k, row in enumerate(rows))])
+
+
+def _spaced(content: str) -> str:
+    """Spaces between columns, and one within the first name."""
+    return content.replace(",", " ").replace("command_V", "valve command_V")
+
+
+@pytest.mark.parametrize(
+    ("change", "counts"), [(_numbered, (4, 5)), (_spaced, (5, 4))], ids=["row numbers", "spaces"]
+)
+def test_names_that_do_not_stand_above_their_columns_are_refused(tmp_path, change, counts):
+    """All channels would be read from the column beside their own."""
+    said = refused(tmp_path, change(text(table())))
+
+    told = "{} names of columns stand above {} columns".format(*counts)
+    assert f"run.csv:1: {told}; expected a name above each column" in said
+    assert len(said.splitlines()) == 1
+
+
+def test_columns_by_number_and_separators_at_the_end_of_rows_need_no_names(tmp_path):
+    content = text(table())
+    rig = RIG
+    for number, name in enumerate(NAMES, start=2):
+        rig = rig.replace(f'"{name}"', str(number))
+
+    plain = read(tmp_path, content)
+    counted = read(tmp_path, _numbered(content), rig=rig)
+    ended = read(tmp_path, content.replace("\n", ",\n").replace(",\n", "\n", 1))
+
+    for name, values in plain.channels.items():
+        assert np.array_equal(counted[name], values) and np.array_equal(ended[name], values)
+
+
 def test_a_file_that_is_not_there_names_its_neighbour(tmp_path):
     (tmp_path / "run1.csv").write_text("x")
 

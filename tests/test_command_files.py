@@ -122,6 +122,8 @@ ONE_ONTO_ANOTHER = [
     ("check", ["lq.toml", "--keep", "new", "--json", "new"], "new"),
     ("check", ["lq.toml", "--json", "new", "--figures", "new/figures"], "new/figures"),
     ("compare", ["run.csv", "--json", "new", "--figures", "new"], "new"),
+    ("diagnose", ["run.csv", "--json", "new", "--figures", "./new"], "new"),
+    ("modes", ["--json", "new", "--export", "new"], "new"),
     ("improve", [*HELD_OUT, "-o", "new", "--json", "new"], "new"),
     ("improve", [*HELD_OUT, "-o", "new", "--report", "new"], "new"),
     ("identify", ["rig.toml", "run.csv", "-o", "new", "--json", "new/a"], "new/a"),
@@ -138,6 +140,10 @@ def test_no_result_is_written_over_another(folder, monkeypatch, command, words, 
     assert answer.exit_code == 2
     assert f"workbench: {named}: is a file that this command writes besides" in answer.stderr
     assert {*folder.iterdir()} == before
+
+
+def test_a_result_may_stand_in_the_folder_of_the_others(tmp_path):
+    writable(tmp_path / "figures" / "errors.json", folders=[tmp_path / "figures"])
 
 
 def test_a_rig_may_be_bettered_in_its_own_file(folder):

@@ -38,3 +38,19 @@ def test_commands_read_back_in_every_dialect(tmp_path, dialect):
     back = read_inputs(rig, tmp_path / "next.csv")
     np.testing.assert_allclose(back[COMMAND], played[COMMAND], rtol=1e-9)
     assert back.sample_time_s == pytest.approx(1e-3)
+
+
+def test_a_file_whose_rows_tell_no_time_is_written_at_the_rate_of_its_rows(tmp_path):
+    """Recorded every millisecond and resampled to 2.5: what is to last 0.5 s must not take 0.2."""
+    rig = default_rig("servo_drive")
+    reader = replace(rig.reader, time=TimeFormat(None, "s", 1e-3), resample_s=2.5e-3)
+    rig = replace(rig, reader=reader)
+    played = Recording("played", 2.5e-3, {COMMAND: np.linspace(4.0, 6.0, 201)})
+
+    write_commands(rig, played, tmp_path / "next.csv", {})
+
+    back = read_inputs(rig, tmp_path / "next.csv")
+    assert back.time_s[-1] == pytest.approx(0.5)
+    np.testing.assert_allclose(back[COMMAND], played[COMMAND], atol=0.01)
+    rows = np.loadtxt(tmp_path / "next.csv", skiprows=1)
+    assert rows[:6] == pytest.approx(played[COMMAND][[0, 0, 0, 1, 1, 2]])

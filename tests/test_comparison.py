@@ -40,9 +40,11 @@ def commands(n=600):
     return Recording("manoeuvre", DT, {"valve.command_v": command})
 
 
-def measured(rig):
-    """The rig's outputs under the commands with seeded noise, as a recording."""
-    clean, rng = run(rig, commands()), np.random.default_rng(3)
+def measured(rig, times=1):
+    """The rig's outputs under the commands, so many times, with seeded noise, as a recording."""
+    once = commands()
+    played = {name: np.tile(values, times) for name, values in once.channels.items()}
+    clean, rng = run(rig, replace(once, channels=played)), np.random.default_rng(3)
     noisy = {n: clean[n] + s * rng.standard_normal(len(clean)) for n, s in NOISE.items()}
     kept = {"valve.command_v": clean["valve.command_v"], **noisy}
     return replace(clean, channels=kept, noise=NOISE)

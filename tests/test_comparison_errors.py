@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from workbench.comparison import horizons
-from workbench.comparison.compare import signal_error
+from workbench.comparison.compare import _worst, signal_error
 from workbench.recording import Recording
 from workbench.rig import default_rig
 
@@ -33,6 +33,19 @@ def test_missing_samples_count_for_nothing():
 
     assert signal_error(y, np.array([1.0, 9.0, 3.0]), 0.1).rmse == 0.0
     assert np.isnan(signal_error(np.full(3, np.nan), y, 0.1).rmse)
+
+
+def test_the_worst_stretches_reach_the_end_and_over_no_gap():
+    """Windows of 0.2 s in pieces of 0.3 and 0.25 s; errors around the gap and at the very end."""
+    squared = np.zeros(550)
+    squared[290:300], squared[300:320], squared[540:] = 1.0, 2.0, 3.0
+    recording = Recording("two pieces", 1e-3, {PRESSURE: squared}, starts=(0, 300))
+
+    found = [(s.start_s, s.end_s, s.share_of_error) for s in _worst(squared, recording, 0.2)]
+
+    assert np.array(found) == pytest.approx(
+        np.array([[0.3, 0.5, 4 / 8], [0.5, 0.55, 3 / 8], [0.2, 0.3, 1 / 8]])
+    )
 
 
 def test_what_fails_in_the_windows_is_not_taken_for_a_short_recording(monkeypatch):

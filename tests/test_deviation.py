@@ -79,3 +79,6 @@ def test_a_shift_that_began_before_the_recording_is_not_counted_and_that_is_said
 
     assert shift_deviations(late) == () and begins_energised(late)
     assert not begins_energised(course_of(gearbox(), recorded.part(0, 500)))
+    cut = replace(recorded.part(0, 500), starts=(0, 260))
+    assert shift_deviations(course_of(gearbox(), cut)) == ()
+    assert begins_energised(course_of(gearbox(), cut))

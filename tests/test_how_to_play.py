@@ -11,7 +11,8 @@ from studies.plain import plain
 from studies.text_of_next_recording import conduct_document, conduct_lines, instructions
 from workbench.diagnosis.result import NextRecording
 from workbench.manoeuvres.conduct import conduct
-from workbench.manoeuvres.limits import limits_of
+from workbench.manoeuvres.library import LIBRARY
+from workbench.manoeuvres.limits import Drive, limits_of
 from workbench.manoeuvres.rehearse import BANDWIDTH_RAD_S, SpeedMap, _loop
 from workbench.recording import Recording
 
@@ -191,3 +192,17 @@ def test_what_is_not_finite_is_null_in_the_document(known):
 
     assert told["starts"]["slide.position"]["at"] is told["contacts"][0]["speed"] is None
     assert told["loop"]["speed_maps"]["slide.position"] == {"command": [None], "speed": [None]}
+
+
+@pytest.mark.parametrize(
+    ("name", "recorded"),
+    [("servo_drive", (A,)), ("crr_leg", ("joint_1.angle_rad", "cap_1.pressure_pa"))],
+)
+def test_nothing_is_played_where_what_moves_is_not_recorded(name, recorded):
+    """Steps of the command, meant for a tank, drive the slide into its stops at 3.5 m/s."""
+    plant = PLANT_MODELS[name].with_measured(*recorded)
+    made_up = Recording("made up", 1e-3, constants(plant, 2000))
+    found = limits_of(plant, [made_up])
+
+    assert found.drive is Drive.UNSEEN
+    assert not [each for each in LIBRARY if each.drive is found.drive]

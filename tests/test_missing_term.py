@@ -213,7 +213,7 @@ def test_a_missing_force_is_always_drawn_against_velocity_and_a_flow_against_a_c
 @pytest.mark.parametrize(
     ("balance", "term", "names", "label"),
     [
-        ("bellows.mass", "mass_flow_kg_s", ["valve.pwm"], "valve pwm"),
+        ("bellows.mass", "mass_flow_kg_s", ["valve.pwm", "rate of valve.pwm"], "valve pwm"),
         ("joint.momentum", "torque_n_m", ["joint.velocity_rad_s"], "joint velocity (deg/s)"),
         ("bellows.mass", "mass_flow_kg_s", ["rate of valve.pwm"], "rate of valve pwm (1/s)"),
         ("bellows.mass", "mass_flow_kg_s", ["rate of valve.command_v"],

@@ -1,6 +1,7 @@
 """The figure of a ranking: its key, and bars of refits beside those of a scan."""
 
 import csv
+from dataclasses import replace
 
 from matplotlib.colors import to_hex
 from test_report import diagnosis
@@ -44,3 +45,11 @@ def test_a_scanned_effect_does_not_look_like_a_refit_in_the_ranking(tmp_path):
         ("validation", "chamber_leak@chamber_a"): "91",
         ("training, only scanned", "valve_lag"): "10",
     }
+
+
+def test_an_error_that_falls_below_the_noise_is_all_of_the_misfit_as_in_text_and_document():
+    found = diagnosis()
+    whole = replace(found.ranking[0], drop_train=1.08, drop_validation=1.2)
+    (axes,) = diagnosis_figures(replace(found, ranking=(whole,)))["ranking"].axes
+
+    assert [bar.get_width() for bars in axes.containers for bar in bars] == [100.0, 100.0]

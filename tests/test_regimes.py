@@ -188,5 +188,19 @@ def test_a_command_that_moves_nothing_is_no_shift(shifting):
     assert shifts(course_of(shifting.whole, replace(shifting.recording, channels=still))) == ()
 
 
+def test_a_shift_that_stays_between_two_gears_reached_none(shifting):
+    """It stands 8 mm from Neutral, High is at 12 mm, and a notch reaches 3 mm."""
+    speed = held((0, 100), (0.2, 40), (0, 300))
+    n = len(speed)
+    channels = {
+        **{name: values[:n] for name, values in shifting.recording.channels.items()},
+        "valve_1.command": held((0, 90), (1, 200), (0, n - 290)),
+        "valve_2.command": np.zeros(n),
+        "main_piston.position_m": DT * np.cumsum(speed),
+    }
+
+    assert shifts(course_of(shifting.whole, replace(shifting.recording, channels=channels))) == ()
+
+
 def test_a_plant_without_gears_has_no_phases(stroke):
     assert not {"in neutral", "travel", "engaging"} & set(stroke)

@@ -68,6 +68,21 @@ def test_missing_samples_take_nothing_off_the_correlation_with_an_input():
     assert found.bands[23] == pytest.approx(1.96 / np.sqrt(4000), rel=0.15)
 
 
+def test_an_error_is_not_held_against_the_input_of_the_piece_before():
+    """Behind each gap the error begins with the last ten inputs before it."""
+    e, u = np.random.default_rng(7).standard_normal((2, 4000))
+    starts = tuple(range(0, 4000, 50))
+    for first in starts[1:]:
+        e[first : first + 10] = 3.0 * u[first - 10 : first]
+
+    across = independence(e, u, "u", 1e-3, 20)
+    found = independence(e, u, "u", 1e-3, 20, starts)
+
+    assert across.correlation[30] > 4.0 * across.bands[30]
+    assert (np.abs(found.correlation) < 1.5 * found.bands).all()
+    assert found.bands[[20, 30]] == pytest.approx(1.96 / np.sqrt([4000, 3200]), rel=0.15)
+
+
 def test_lags_that_no_pair_has_are_left_out():
     error = np.sin(np.arange(400.0))
     error[::2] = np.nan

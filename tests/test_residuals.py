@@ -128,9 +128,12 @@ SIGNALS = {
 }
 
 
+@pytest.mark.parametrize("every", [1, 5], ids=["every sample", "a slow sensor"])
 @pytest.mark.parametrize("case", SIGNALS)
-def test_it_is_said_where_the_noise_is_known_from(case):
-    values, source = SIGNALS[case]
+def test_it_is_said_where_the_noise_is_known_from(case, every):
+    taken, source = SIGNALS[case]
+    values = np.full(len(taken) * every, np.nan)
+    values[::every] = taken
 
     found = recorded_noise(recording_of(values), [NAME])[NAME]
 

@@ -10,6 +10,7 @@ from workbench.consistency import Weight, trusted
 from workbench.fitting.noise import measured_noise
 from workbench.plants.crr_rig import crr_rig
 from workbench.reading import RecordingWarning, read_recording
+from workbench.reading.plausible import stuck_stretch
 from workbench.recording import Recording
 from workbench.rig import load_rig
 from workbench.saturation import saturated
@@ -36,6 +37,19 @@ def test_every_sample_of_every_clipped_run_is_saturated(name, top):
     clipped = SIZE[name] * np.clip(values, -top, top)
 
     assert np.array_equal(saturated(name, clipped), np.abs(values) > top)
+
+
+@pytest.mark.parametrize("every", [2, 5, 10])
+def test_a_slow_sensor_on_a_fast_clock_saturates_and_sticks_as_any_other(every):
+    """All samples but every second, fifth or tenth are missing."""
+    values = np.full(6000 * every, np.nan)
+    values[::every] = np.clip(noisy(0.01), -0.9, 0.9)
+
+    assert np.array_equal(saturated(PRESSURE, 1e5 * values), np.abs(values) == 0.9)
+
+    values[::every] = noisy(0.01)
+    values[2000 * every : 3500 * every : every] = 0.1
+    assert stuck_stretch(values) == (2000 * every, 1499 * every + 1)
 
 
 @pytest.mark.parametrize("resolution", [1e-4, 1e-3, 5e-3])

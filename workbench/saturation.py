@@ -28,9 +28,19 @@ FINE_SHARE = 0.1  # of the gaps: the smallest may be the last digit of a small n
 
 
 def saturated(name: str, values: np.ndarray) -> np.ndarray:
-    """Which samples of an output are at an end of its sensor's range, of type bool, (n,)."""
+    """Which samples of an output are at an end of its sensor's range, of type bool, (n,).
+
+    Samples are held against the next one there is: on a fast clock a slow sensor misses most.
+    """
+    found, seen = np.zeros(len(values), bool), np.isfinite(values)
+    found[seen] = _saturated(name, values[seen])
+    return found
+
+
+def _saturated(name: str, values: np.ndarray) -> np.ndarray:
+    """The same of values without holes."""
     none = np.zeros(len(values), bool)
-    ends = [values == end(values) for end in (np.nanmin, np.nanmax)] if _moves(values) else []
+    ends = [values == end(values) for end in (np.min, np.max)] if _moves(values) else []
     piled = [at for at in ends if _piled_up(at) and not _at_rest(name, values[at][0])]
     if not piled:
         return none
@@ -41,8 +51,7 @@ def saturated(name: str, values: np.ndarray) -> np.ndarray:
 
 
 def _moves(values: np.ndarray) -> bool:
-    seen = values[np.isfinite(values)]
-    return bool(len(seen) > FEWEST and np.ptp(seen) > 0.0)
+    return bool(len(values) > FEWEST and np.ptp(values) > 0.0)
 
 
 def _piled_up(at: np.ndarray) -> bool:
@@ -79,7 +88,7 @@ def _resolution(values: np.ndarray, end: float) -> float:
 
     Numbers of so many digits have one that grows with them.
     """
-    levels = np.unique(values[np.isfinite(values)])
+    levels = np.unique(values)
     near = levels[:NEAR_END] if end == levels[0] else levels[-NEAR_END:]
     gaps = [float(np.quantile(np.diff(each), FINE_SHARE)) for each in (near, levels)]
     return max(*gaps, _smallest_step(values))
@@ -88,5 +97,5 @@ def _resolution(values: np.ndarray, end: float) -> float:
 def _smallest_step(values: np.ndarray) -> float:
     """Of third differences, multiples of the resolution without motion, in a quiet block."""
     steps = np.abs(np.diff(values, 3))
-    blocks = in_blocks(steps[steps > 1e-9 * np.ptp(values[np.isfinite(values)])])
+    blocks = in_blocks(steps[steps > 1e-9 * np.ptp(values)])
     return float(np.quantile(blocks.min(axis=1), QUIET_SHARE)) if len(blocks) else 0.0

@@ -19,7 +19,7 @@ from studies.figures.style import (
     thinned,
 )
 from studies.text import RATE, labelled
-from workbench.diagnosis.result import DecidedBy
+from workbench.diagnosis.result import DecidedBy, told
 from workbench.units import display_scale, display_unit, public_name
 
 if TYPE_CHECKING:
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from workbench.diagnosis.result import Diagnosis, Ranked, Where
 
 SHOWN, SHOWN_BALANCES, SHOWN_DRIVERS = 10, 8, 3
-SPEEDS, COMMANDS = ("velocity_m_s", "velocity_rad_s"), (".command", ".pwm")  # ends of names
 HOLLOW = {"color": "white", "edgecolor": GREY, "hatch": "....", "linewidth": 0.6}
 SAID = 0.02  # of the variance of a missing term: less that parameters explain is not said
 
@@ -62,8 +61,8 @@ def ranking_figure(found: Diagnosis) -> Figure:
         axes.set_ylim(len(rows) - 0.5, -0.5)
         axes.set_xlim(0.0, 105.0)
         axes.set_xlabel("drop of the misfit beyond noise (%)")
-        told = "bold: accepted" + ("; =: cannot be told apart here" if tied else "")
-        figure.suptitle(f"{found.verdict.value.replace('_', ' ')}\n{told}", fontsize=8)
+        key = "bold: accepted" + ("; =: cannot be told apart here" if tied else "")
+        figure.suptitle(f"{found.verdict.value.replace('_', ' ')}\n{key}", fontsize=8)
         if axes.containers:
             figure.legend(loc="outside lower center", ncols=3, columnspacing=1.0)
     return figure
@@ -87,8 +86,8 @@ def _draw_drops(axes: Axes, rows: Sequence[Ranked]) -> None:
 
 
 def _bar(share: float) -> float:
-    """Length of a bar in percent: none for what makes the misfit larger."""
-    return 100.0 * max(share, 0.0)
+    """Length of a bar in percent, as it is told: none for what makes the misfit larger."""
+    return 100.0 * max(told(share), 0.0)
 
 
 def _ranked_name(name: str, tied: set[str]) -> str:
@@ -121,17 +120,20 @@ def _panels(where: Where) -> list[Dependence]:
     """What the term follows most, and the variable that engineers look for first."""
     drawable = [each for each in where.against if each.bins.shape[1]]
     strongest = drawable[:SHOWN_DRIVERS]
-    place, _, kind = where.balance.rpartition(".")
-    force, velocity = kind == "momentum", [f"{place}.{speed}" for speed in SPEEDS]
-    names = [each.variable for each in drawable]
-    usual = next((n for n in names if (n in velocity if force else _is_command(n))), None)
+    names, looked_for = [each.variable for each in drawable], _looked_for(where)
+    usual = next((name for name in names if name in looked_for), None)
     if usual is None or usual in names[:SHOWN_DRIVERS]:
         return strongest
     return [*strongest[:-1], drawable[names.index(usual)]]
 
 
-def _is_command(variable: str) -> bool:
-    return any(word in variable for word in COMMANDS) and not variable.startswith(RATE)
+def _looked_for(where: Where) -> set[str]:
+    """Velocities of what a force moves; of a flow the commands, which alone have rates."""
+    place, _, kind = where.balance.rpartition(".")
+    if kind == "momentum":
+        return {f"{place}.velocity_m_s", f"{place}.velocity_rad_s"}
+    names = (each.variable for each in where.against)
+    return {name.removeprefix(RATE) for name in names if name.startswith(RATE)}
 
 
 def _term(where: Where) -> tuple[float, str]:
@@ -153,10 +155,10 @@ def _draw_term(axes: Axes, where: Where) -> None:
     axes.plot(time_s, term, color=BLUE, linewidth=0.6, label="missing term, one deviation shaded")
     axes.set_xlabel("time (s)")
     axes.set_ylabel(label)
-    told = f"what the balance {public_name(where.balance)} lacks"
+    title = f"what the balance {public_name(where.balance)} lacks"
     if where.imitated > SAID:
-        told += f" (below: without {100.0 * where.imitated:.0f} % that parameters may explain)"
-    axes.set_title(told)
+        title += f" (below: without {100.0 * where.imitated:.0f} % that parameters may explain)"
+    axes.set_title(title)
     _leave_room(axes, 0.25)
     axes.legend(loc="upper right", ncols=2)
 
@@ -175,7 +177,7 @@ def _draw_balances(axes: Axes, where: Where) -> None:
 def _draw_dependence(axes: Axes, where: Where, dependence: Dependence) -> None:
     factor, label = _term(where)
     name = dependence.variable
-    per = 1.0 / display_scale(name.removeprefix(RATE)).factor
+    per = 1.0 / display_scale(name).factor
     centres, means, spreads = dependence.bins * np.array([[per], [factor], [factor]])
     band = {"color": BLUE, "alpha": 0.2, "linewidth": 0, "label": "one deviation in each bin"}
     axes.fill_between(centres, means - spreads, means + spreads, **band)

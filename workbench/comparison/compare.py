@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -74,7 +75,8 @@ class RecordingComparison:
     worst
         Windows with the largest error, worst first.
     measured, simulated
-        Recorded outputs (n,) by full name, and what each horizon gives, NaN where nothing.
+        Recorded outputs (n,) by full name, NaN where a sensor is stuck or saturated too, and what
+        each horizon gives, NaN where nothing.
     noise
         By full output name, with where it is known from.
     residuals
@@ -124,7 +126,8 @@ class Comparison:
 def compare(rig: Rig, recordings: Sequence[Recording]) -> Comparison:
     """How well the rig's plant tells what was recorded; see the module for the horizons.
 
-    Warns of what of a recording does not fit the rig, and compares it all the same.
+    Warns of what of a recording does not fit the rig, and compares it all the same.  Samples of a
+    sensor that is stuck or saturated are no measurement, and left out as in a fit.
     """
     for recording in recordings:
         warn_beyond(rig, recording)
@@ -132,7 +135,7 @@ def compare(rig: Rig, recordings: Sequence[Recording]) -> Comparison:
 
 
 def _compared(rig: Rig, recording: Recording) -> RecordingComparison:
-    findings = warned(rig, recording)
+    recording, findings = warned(rig, recording)
     course = course_of(rig.fit_for(recording), recording)
     plant = course.plant
     noise = recorded_noise(recording, plant.measured)
@@ -152,7 +155,7 @@ def _compared(rig: Rig, recording: Recording) -> RecordingComparison:
             for horizon, rows in simulated.items()
         },
         by_regime=_by_regime(course, squared),
-        worst=_worst(squared, recording.sample_time_s, length_s),
+        worst=_worst(squared, recording, length_s),
         measured=measured,
         simulated=simulated,
         noise=noise,
@@ -200,7 +203,7 @@ def _by_regime(course: Course, squared: np.ndarray) -> tuple[Regime, ...]:
 
 
 def _shifts(course: Course) -> tuple[tuple[ShiftDeviation, ...], list[str]]:
-    early = "the first shift began before the recording: its deviation is not known"
+    early = "a shift began before the recording, or a piece of it, did: its deviation is not known"
     notes = [early] if begins_energised(course) else []
     try:
         return shift_deviations(course), notes
@@ -217,14 +220,19 @@ def _pieces_in_words(recording: Recording) -> tuple[str, ...]:
     return (f"{told}, from {begins} s on: times leave the gaps out",)
 
 
-def _worst(squared: np.ndarray, sample_time_s: float, window_s: float) -> tuple[Span, ...]:
-    """The stretches as long as a window with the largest error."""
-    length = max(round(window_s / sample_time_s), 1)
+def _worst(squared: np.ndarray, recording: Recording, window_s: float) -> tuple[Span, ...]:
+    """The stretches with the largest error, as long as a window or to the end of their piece."""
+    dt = recording.sample_time_s
+    length = max(round(window_s / dt), 1)
     total = float(np.nansum(squared))
-    firsts = range(0, max(len(squared) - length + 1, 1), length)
-    sums = [(float(np.nansum(squared[k : k + length])), k) for k in firsts]
+    spans = [
+        (first, min(first + length, end))
+        for start, end in pairwise((*recording.starts, len(squared)))
+        for first in range(start, end, length)
+    ]
+    sums = [(float(np.nansum(squared[first:last])), first, last) for first, last in spans]
     return tuple(
-        Span(k * sample_time_s, min(k + length, len(squared)) * sample_time_s, found / total)
-        for found, k in sorted(sums, reverse=True)[:WORST]
+        Span(first * dt, last * dt, found / total)
+        for found, first, last in sorted(sums, reverse=True)[:WORST]
         if found > 0
     )

@@ -114,23 +114,24 @@ def shifts(course: Course) -> tuple[Shift, ...]:
 
 
 def begins_energised(course: Course) -> bool:
-    """True where a shift may have begun before the recording did."""
+    """True where a shift may have begun before the recording did, or a piece of it."""
     on = _energised(course)
-    return gears_of(course) is not None and bool(on.size and on[:, 0].any())
+    return gears_of(course) is not None and bool(on[:, list(course.recording.starts)].any())
 
 
 def _shift(gears: Gears, first: int, until: int, waiting: int) -> Shift | None:
     """The shift that began at ``first``, ended by the next change, or else by the next energising.
 
-    The gear is reached where the position enters its neighbourhood for good.
+    The gear is reached where the position enters its neighbourhood for good; none is where it ends
+    within reach of no notch.
     """
     for end in (until, waiting):
         near = _notch(gears.place.value[first:end], gears.pitch_m, REACHED)
         if near[-1] != BETWEEN:
             break
     origin = round(float(gears.place.value[first]) / gears.pitch_m)
-    target = round(float(gears.place.value[end - 1]) / gears.pitch_m)
-    if origin == target:
+    (target,) = _notch(gears.place.value[end - 1 : end], gears.pitch_m, REACH).tolist()
+    if target in (origin, BETWEEN):
         return None
     outside = np.flatnonzero(near != target)
     last = min(first + int(outside[-1]) + 1, end - 1)

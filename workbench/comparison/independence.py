@@ -3,15 +3,15 @@
 Where model and noise are right, the error e knows nothing of the input u.  Then their correlation
 at lag k, r(k) = sum e(t + k) u(t) / (n s_e s_u), stays within +-1.96 sqrt(P / n) for 95 % of all
 lags, with P = sum over k of R_e(k) R_u(k), both as correlations.  Lags below zero show feedback.
-Where samples are missing each sum has fewer terms than it would have: r(k) is scaled up by that,
-the band by its root.
+Where samples are missing, or a piece ends, each sum has fewer terms than it would have: r(k) is
+scaled up by that, the band by its root.
 
 Source: Ljung, System Identification, 2nd ed., 16.6, Eq. 16.64 to 16.66.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -61,25 +61,35 @@ def independence_of(
             against,
             recording.sample_time_s,
             len(compared.residuals[name].lag_s),
+            recording.starts,
         )
         for name in compared.measured
     }
 
 
 def independence(
-    error: np.ndarray, values: np.ndarray, against: str, sample_time_s: float, lags: int
+    error: np.ndarray,
+    values: np.ndarray,
+    against: str,
+    sample_time_s: float,
+    lags: int,
+    starts: Sequence[int] = (0,),
 ) -> Independence:
-    """Correlation of an error (n,), NaN where there is none, with an input (n,) at +-lags."""
+    """Correlation of an error (n,), NaN where there is none, with an input (n,) at +-lags.
+
+    ``starts`` are the first samples of pieces: no pair reaches from one into another.
+    """
     seen = np.isfinite(error) & np.isfinite(values)
     count = int(seen.sum())
     if not count or np.ptp(error[seen]) == 0.0 or np.ptp(values[seen]) == 0.0:
         return Independence(against, *np.zeros((3, 0)))
     lags = max(min(lags, count - 1), 0)
-    e, u = (np.where(seen, each - each[seen].mean(), 0.0) for each in (error, values))
+    rows = (np.where(seen, each - each[seen].mean(), 0.0) for each in (error, values))
+    e, u, known = (_apart(row, starts, lags) for row in (*rows, 1.0 * seen))
     steps = np.arange(-lags, lags + 1)
-    pairs = _sums(1.0 * seen, 1.0 * seen, steps)
+    pairs = _sums(known, known, steps)
     steps, pairs = steps[pairs > 0], pairs[pairs > 0]
-    kept = pairs / (count * (1.0 - np.abs(steps) / len(e)))  # of the pairs without a hole
+    kept = pairs / (count * (1.0 - np.abs(steps) / len(error)))  # of the pairs without a hole
 
     def correlation(one: np.ndarray, other: np.ndarray) -> np.ndarray:
         return _sums(one, other, steps) / kept / np.sqrt((one @ one) * (other @ other))
@@ -87,6 +97,11 @@ def independence(
     spread = float(np.sum(kept * correlation(e, e) * correlation(u, u)))
     bands = NORMAL_95 * np.sqrt(max(spread, 1.0) / count / kept)
     return Independence(against, sample_time_s * steps, correlation(e, u), bands)
+
+
+def _apart(values: np.ndarray, starts: Sequence[int], lags: int) -> np.ndarray:
+    """Values (n,) with so many zeros behind each piece."""
+    return np.concatenate([np.pad(piece, (0, lags)) for piece in np.split(values, starts[1:])])
 
 
 def _sums(one: np.ndarray, other: np.ndarray, steps: np.ndarray) -> np.ndarray:

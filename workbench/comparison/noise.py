@@ -18,7 +18,7 @@ from enum import Enum
 import numpy as np
 
 from workbench.fitting.noise import NoNoiseError, measured_noise
-from workbench.quiet_blocks import BLOCK, deviations
+from workbench.quiet_blocks import BLOCK, deviations, in_blocks
 from workbench.recording import Recording
 from workbench.saturation import saturated
 from workbench.units import public_name
@@ -99,12 +99,13 @@ def _source(recording: Recording, name: str, noise: float) -> NoiseSource:
 
 
 def _blocks(recording: Recording, name: str) -> np.ndarray:
-    """Stretches of neighbouring samples without a hole or saturation, shape (n_blocks, BLOCK)."""
+    """Stretches of samples that are there and not saturated, shape (n_blocks, BLOCK).
+
+    In one across a hole an output that moves is less still.
+    """
     found = []
     at_ends = saturated(name, recording[name])
     kept = np.where(at_ends, np.nan, recording[name])
     for piece in replace(recording, channels={name: kept}).pieces:
-        count = len(piece) // BLOCK
-        cut = piece[name][: count * BLOCK].reshape(count, BLOCK)
-        found.append(cut[np.isfinite(cut).all(axis=1)])
+        found.append(in_blocks(piece[name]))
     return np.concatenate(found)

@@ -78,13 +78,16 @@ def examined(rig: Rig, recording: Recording) -> tuple[Finding, ...]:
     return tuple(_examined(rig, recording)[1])
 
 
-def warned(rig: Rig, recording: Recording) -> tuple[Finding, ...]:
-    """The same, with a :class:`RecordingWarning` for each: numbers without it would be believed."""
-    findings = examined(rig, recording)
+def warned(rig: Rig, recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
+    """The same beside the recording without the samples of stuck sensors, as fits have it.
+
+    With a :class:`RecordingWarning` for each finding: numbers without it would be believed.
+    """
+    kept, findings = _examined(rig, recording)
     for finding in findings:
         refused = f"; {REFUSING}" if finding.weight is Weight.REFUSED else ""
         warnings.warn(f"{finding}{refused}", RecordingWarning, stacklevel=3)
-    return findings
+    return kept, tuple(findings)
 
 
 def _examined(rig: Rig, recording: Recording) -> tuple[Recording, list[Finding]]:

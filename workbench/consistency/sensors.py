@@ -73,10 +73,14 @@ def _small(plant: Plant, recording: Recording, name: str) -> bool:
 
 
 def _white_share(recording: Recording, name: str) -> float:
-    """Standard deviation of the white part of a channel over that of the whole."""
+    """Standard deviation of the white part of a channel over that of the whole.
+
+    0 where no four neighbours are recorded, as of a slow sensor on a fast clock.
+    """
     spread = float(np.nanstd(recording[name]))
-    third = [np.diff(piece[name], 3) for piece in recording.pieces]
-    third_rms = np.sqrt(np.nanmean(np.concatenate(third) ** 2)) if len(third) else 0.0
+    third = np.concatenate([np.diff(piece[name], 3) for piece in recording.pieces])
+    third = third[np.isfinite(third)]
+    third_rms = np.sqrt(np.mean(third**2)) if len(third) else 0.0
     return float(third_rms / np.sqrt(THIRD_DIFFERENCE_GAIN)) / max(spread, 1e-300)
 
 
@@ -127,7 +131,7 @@ def _without_saturated(plant: Plant, recording: Recording) -> tuple[Recording, l
         if at_ends.any():
             channels[name] = np.where(at_ends, np.nan, values)
             what = saturation_text(name, values, at_ends)
-            remedy = "left out of fits and of the noise; a sensor of a wider range would tell them"
+            remedy = "left out of errors, fits and noise; a sensor of a wider range would tell them"
             found.append(_finding(Weight.DOUBT, recording, name, what, remedy))
     return replace(recording, channels=channels) if found else recording, found
 

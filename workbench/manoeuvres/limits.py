@@ -15,6 +15,7 @@ from math import inf, isfinite
 import numpy as np
 
 from workbench.effects.forces import EndStops
+from workbench.fitting.window_length import moves
 from workbench.plant import Plant, Signal
 from workbench.recording import Recording
 from workbench.units import public_name
@@ -36,6 +37,7 @@ class Drive(Enum):
     POSITION = "each command moves a position or an angle, which integrates it"
     PRESSURE = "commands fill and vent volumes"
     SWITCHED = "commands are on or off"
+    UNSEEN = "commands move what is not recorded: no limit of it can be kept, so nothing is played"
 
 
 @dataclass(frozen=True)
@@ -118,10 +120,15 @@ def limits_of(plant: Plant, recordings: Sequence[Recording]) -> Limits:
     commands = tuple(_bounded(signal, recordings) for signal in plant.commands)
     outputs = [name for name in plant.measured if name.endswith(POSITIONS)]
     switched = any(signal.levels for signal in commands)
-    moves = not switched and len(outputs) == len(commands)
+    seen = not switched and len(outputs) == len(commands)
     begun = {} if switched else _begun(plant, recordings[0])
-    axes = tuple(_axis(plant, name, recordings) for name in outputs) if moves else ()
-    drive = Drive.SWITCHED if switched else Drive.POSITION if axes else Drive.PRESSURE
+    axes = tuple(_axis(plant, name, recordings) for name in outputs) if seen else ()
+    if switched:
+        drive = Drive.SWITCHED
+    elif axes:
+        drive = Drive.POSITION
+    else:
+        drive = Drive.UNSEEN if moves(plant) else Drive.PRESSURE
     samples = min(round(DURATION_S / dt), MOST_SAMPLES)
     return Limits(drive, commands, axes, _highest_pa(plant, recordings), begun, dt, samples)
 

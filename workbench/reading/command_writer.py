@@ -18,6 +18,7 @@ from workbench.units import display_scale, public_name, scale
 from workbench.whole_file import whole_file
 
 MISSING = "nan"  # in numbered columns that nothing is written to
+SLACK = 1e-6  # of a sample: rows are at multiples of it up to rounding
 
 
 def write_commands(
@@ -26,9 +27,11 @@ def write_commands(
     """Time, commands and what else the plant needs as measured input, for :func:`read_inputs`.
 
     ``reference`` are further columns by output, (n,) in SI, in the output's own unit: what a
-    position loop is to follow.  The file appears only once it is complete.
+    position loop is to follow.  Where the rig tells the time between rows, commands are held at
+    that: its recordings may be resampled.  The file appears only once it is complete.
     """
-    keyed = _keyed(rig, recording, reference)
+    rows = _rows(rig, recording)
+    keyed = [(key, values[rows]) for key, values in _keyed(rig, recording, reference)]
     columns = _placed(keyed, reader_numbers=any(isinstance(key, int) for key, _ in keyed))
     reader = rig.reader
     decimal = reader.decimal or "."
@@ -61,6 +64,13 @@ def _keyed(rig: Rig, recording: Recording, reference: Mapping[str, np.ndarray]) 
         label = channel.column if channel and isinstance(channel.column, str) else public_name(name)
         found.append((f"reference {label}", unit.from_si(values)))
     return found
+
+
+def _rows(rig: Rig, recording: Recording) -> np.ndarray:
+    """The sample that holds at each row of the file, (n_rows,)."""
+    per_row = (rig.reader.time.step_s or recording.sample_time_s) / recording.sample_time_s
+    count = int((len(recording) - 1) / per_row + SLACK) + 1
+    return (per_row * np.arange(count) + SLACK).astype(int)
 
 
 def _inputs(plant: Plant) -> list[str]:

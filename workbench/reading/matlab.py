@@ -21,7 +21,7 @@ REMEDY = "plain arrays: s = struct('t', ts.Time, 'y', ts.Data), then save('file.
 
 
 def matlab_table(path: Path) -> Table:
-    """The columns of a MAT file; all have as many rows as the longest that occurs most often.
+    """The columns of a MAT file; those that are read together must be of one length.
 
     Raises
     ------

@@ -149,14 +149,16 @@ def _shown(name: str, value: float) -> str:
 def stuck_stretch(values: np.ndarray) -> tuple[int, int] | None:
     """First sample and length of the longest stretch that is equal to the last bit, (n,).
 
-    None where it is short, or where the channel often stands still.
+    Samples are held against the next one there is.  None where it is short, or where the channel
+    often stands still.
     """
-    same = np.diff(values) == 0
+    there = np.flatnonzero(np.isfinite(values))
+    same = np.diff(values[there]) == 0
     length, first = _longest_run(same)
     rest = np.delete(same, slice(first, first + length)) if length else same
     if length < RUN or not len(rest) or rest.mean() > LIVELY:
         return None
-    return first, length + 1
+    return int(there[first]), int(there[first + length] - there[first]) + 1
 
 
 def _longest_run(same: np.ndarray) -> tuple[int, int]:

@@ -34,7 +34,8 @@ def text_table(path: Path, reader: RecordingFormat) -> Table:
     Raises
     ------
     InputError
-        If it holds no rows of numbers, or numbers where names were expected.
+        If it holds no rows of numbers, numbers where names were expected, or other columns than
+        names.
     """
     file, lines = str(path), decoded(open_bytes(path)).splitlines()
     if _binary(lines):
@@ -66,7 +67,12 @@ def text_table(path: Path, reader: RecordingFormat) -> Table:
     numbers = np.fromiter((n for n, _ in data), int, len(data))
     body = plain_numbers([line for _, line in data], separator, reader)
     names = _names(head[1], separator) if head else []
-    n_columns = max(len(names), len(_cells(body[0], separator)))
+    cells = _cells(body[0], separator)
+    if head and not _aligned(names, cells, separator) and _by_name(reader):
+        what = f"{len(names)} names of columns stand above {len(cells)} columns"
+        expected = "a name above each column, or numbers of columns in [recording]"
+        raise InputError(Message(what, expected=expected, file=file, line=head[0]))
+    n_columns = max(len(names), len(cells))
     load = partial(_load, body=body, separator=separator, file=file, numbers=numbers)
     told = [word.strip("[]()") for word in _names(units, separator)] if units else []
     return Table(file, names, n_columns, load, lambda row: f"line {numbers[row]}", told)
@@ -145,6 +151,23 @@ def _names(line: str, separator: str) -> list[str]:
     if separator == " " and re.search(r"\s{2,}|\t", line.strip()):
         return [name.strip(" \"'") for name in re.split(r"\s{2,}|\t", line.strip())]
     return [name.strip(" \"'") for name in _cells(line, separator)]
+
+
+def _aligned(names: Sequence[str], cells: Sequence[str], separator: str) -> bool:
+    """Whether each name stands above its column.
+
+    A column of row numbers has no name in what some programs write, and a name with a space in it
+    is two where spaces separate.  Rows may end early, and with a separator.
+    """
+    filled = max((k for k, cell in enumerate(cells, start=1) if cell), default=0)
+    return filled <= len(names) and (separator != " " or len(names) <= len(cells))
+
+
+def _by_name(reader: RecordingFormat) -> bool:
+    """Whether any column is looked up by its name."""
+    columns = [channel.column for channel in reader.channels.values()]
+    timed = [] if reader.time.step_s is not None else [reader.time.column or "time"]
+    return any(isinstance(column, str) for column in (*timed, *columns))
 
 
 def _load(

@@ -1,0 +1,43 @@
+"""Comparisons with sensors that saturate, and with slow ones on a fast clock."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_comparison import NOISE, PRESSURE, measured
+
+from workbench.comparison import compare
+from workbench.comparison.compare import FREE_RUN, ONE_STEP, WINDOW
+from workbench.consistency import examined
+from workbench.reading import RecordingWarning
+from workbench.rig import default_rig
+
+
+@pytest.fixture(scope="module")
+def drive():
+    return default_rig("servo_drive")
+
+
+def test_samples_of_a_saturated_sensor_count_in_no_error(drive):
+    """The plant that made the recording is up to a bar off where the sensor ends."""
+    recording = measured(drive, times=3)
+    top = float(np.quantile(recording[PRESSURE], 0.7))
+    clipped = {**recording.channels, PRESSURE: np.minimum(recording[PRESSURE], top)}
+
+    with pytest.warns(RecordingWarning, match="saturated at"):
+        found = compare(drive, [replace(recording, channels=clipped)]).recordings[0]
+
+    assert np.array_equal(np.isnan(found.measured[PRESSURE]), recording[PRESSURE] >= top)
+    for horizon in (ONE_STEP, WINDOW, FREE_RUN):
+        assert found.errors[horizon][PRESSURE].rmse < 3 * NOISE[PRESSURE]
+    assert "left out of errors" in found.notes[-1]
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_slow_sensor_on_a_fast_clock_is_looked_at_without_a_word(drive):
+    """Every other sample is missing: no four neighbours tell its noise."""
+    recording = measured(drive)
+    pressure_pa = np.where(np.arange(len(recording)) % 2, np.nan, recording[PRESSURE])
+    slow = replace(recording, channels={**recording.channels, PRESSURE: pressure_pa})
+
+    assert examined(drive, slow) == ()
