@@ -59,8 +59,13 @@ def test_a_foreseen_delay_takes_margins_although_it_leaves_the_poles(mode, law):
     assert [radius < 1.0 for radius in wrong_s] == [d < found.delay_s for d in NEAR]
 
 
-def test_less_than_half_a_sample_is_not_foreseen_as_the_estimators_do_not(mode, law):
-    assert foresighted(mode, law, DT, 0.4 * DT) is law
+@pytest.mark.parametrize("share", [0.4, 0.9])
+def test_a_part_of_a_sample_is_foreseen_as_the_estimators_do(mode, law, share):
+    """It was rounded, to none or to all of a sample: what the estimators no longer do."""
+    alone = np.linalg.eigvals(closed(mode, law, DT))
+    late = np.linalg.eigvals(closed(mode, foresighted(mode, law, DT, share * DT), DT, share * DT))
+
+    assert np.sort(abs(late))[-5:] == pytest.approx(np.sort(abs(alone)), rel=1e-6)
 
 
 @pytest.mark.parametrize(
