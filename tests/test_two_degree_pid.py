@@ -143,6 +143,16 @@ def test_the_dead_zone_is_jumped_and_dither_goes_around_the_opening(drive):
     assert moved[:20] == pytest.approx(moved[20:], abs=1e-6)
 
 
+def test_a_spool_that_an_estimator_does_not_tell_of_is_not_led():
+    """With a valve lag `check --estimator raw`, `kalman` and `imm` ended with a KeyError."""
+    slow = standard_modes(servo_drive().with_values({"valve_lag.time_constant_s": 8e-3}))
+    pid = pid_with(slow, PidGains(proportional=10.0, integral=0.0, derivative=0.0))
+    _, commands = steps(pid, 0.15, [0.14] * 3)
+
+    assert pid.valve.lag is not None
+    assert commands == pytest.approx(pid.valve.command(0.1)[0])
+
+
 def test_friction_is_compensated_towards_the_target(drive):
     """At rest the opening of the wanted direction is sent before there is any integral."""
     none = PidGains(proportional=0.0, integral=0.0, derivative=0.0)
