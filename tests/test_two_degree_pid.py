@@ -98,6 +98,19 @@ def test_gains_that_change_with_the_mode_leave_the_opening_where_it_was(rig):
     assert abs(unscheduled[2] - openings[2]) > 0.5
 
 
+def test_a_step_that_turns_the_direction_leaves_nothing_in_the_integral(rig):
+    """The error of a step met the gains of both directions: 0.6 V stayed, and 1.6 mm of the rig."""
+    up = PidGains(proportional=60.0, integral=1e-3, derivative=0.1)
+    down = replace(up, proportional=75.0)
+    sides = Schedule(np.array([0.08]), (up,), (down,))
+    feedforward = PidParts(turn_speed=1e-4, standing_per_s=20.0)
+    pid = pid_with(rig, sides, feedforward)
+    openings, _ = steps(pid, [0.0799] * 5 + [0.1] * 5, [0.08] * 10)
+
+    assert openings[:5] == pytest.approx(-75.0 * 1e-4, rel=1e-3)
+    assert openings[5:] == pytest.approx(60.0 * 0.02, rel=3e-3)
+
+
 def test_the_integral_follows_the_limit_and_comes_off_it_at_once(rig):
     gains = PidGains(proportional=100.0, integral=400.0, derivative=0.0)
     slow = pid_with(rig, gains, PidParts(tracking_time_s=1e6))
