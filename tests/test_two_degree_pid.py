@@ -98,19 +98,6 @@ def test_gains_that_change_with_the_mode_leave_the_opening_where_it_was(rig):
     assert abs(unscheduled[2] - openings[2]) > 0.5
 
 
-def test_a_step_that_turns_the_direction_leaves_nothing_in_the_integral(rig):
-    """The error of a step met the gains of both directions: 0.6 V stayed, and 1.6 mm of the rig."""
-    up = PidGains(proportional=60.0, integral=1e-3, derivative=0.1)
-    down = replace(up, proportional=75.0)
-    sides = Schedule(np.array([0.08]), (up,), (down,))
-    feedforward = PidParts(turn_speed=1e-4, standing_per_s=20.0)
-    pid = pid_with(rig, sides, feedforward)
-    openings, _ = steps(pid, [0.0799] * 5 + [0.1] * 5, [0.08] * 10)
-
-    assert openings[:5] == pytest.approx(-75.0 * 1e-4, rel=1e-3)
-    assert openings[5:] == pytest.approx(60.0 * 0.02, rel=3e-3)
-
-
 def test_the_integral_follows_the_limit_and_comes_off_it_at_once(rig):
     gains = PidGains(proportional=100.0, integral=400.0, derivative=0.0)
     slow = pid_with(rig, gains, PidParts(tracking_time_s=1e6))
@@ -154,16 +141,6 @@ def test_the_dead_zone_is_jumped_and_dither_goes_around_the_opening(drive):
     assert commands - 4.95 == pytest.approx(0.42 + 0.1, abs=0.02)
     assert np.ptp(moved) > 2.0 * 0.42
     assert moved[:20] == pytest.approx(moved[20:], abs=1e-6)
-
-
-def test_a_spool_that_an_estimator_does_not_tell_of_is_not_led():
-    """With a valve lag `check --estimator raw`, `kalman` and `imm` ended with a KeyError."""
-    slow = standard_modes(servo_drive().with_values({"valve_lag.time_constant_s": 8e-3}))
-    pid = pid_with(slow, PidGains(proportional=10.0, integral=0.0, derivative=0.0))
-    _, commands = steps(pid, 0.15, [0.14] * 3)
-
-    assert pid.valve.lag is not None
-    assert commands == pytest.approx(pid.valve.command(0.1)[0])
 
 
 def test_friction_is_compensated_towards_the_target(drive):
