@@ -16,40 +16,47 @@ from controllers.two_degree_pid import Dither, PidGains, TwoDegreePid
 from linearize.modes import HybridModel
 from workbench.errors import InputError, Message
 
-USUAL_HZ, BANDWIDTHS_HZ = 0.7, {"crr_rig": 5.0}
-"""Bandwidths where none is asked for, by plant.
 
-The weakest mode of an arm allows no more, and on a drive a faster loop breaks away too far from
-stiction: it swings by millimetres about its target.  The light rod of the rig has a stiff and
+@dataclass(frozen=True, kw_only=True)
+class Usual:
+    """Numbers where none are asked for; a ``tracking_time_s`` of 0 is that of the gains."""
+
+    bandwidth_hz: float = 0.7
+    integral_periods: float = 40.0
+    standing_per_s: float = 20.0
+    tracking_time_s: float = 0.0
+
+
+USUAL = {
+    "crr_rig": Usual(bandwidth_hz=5.0),
+    "crr_arm": Usual(integral_periods=10.0, tracking_time_s=0.05),
+    "servo_drive": Usual(bandwidth_hz=1.0, integral_periods=26.0, standing_per_s=60.0),
+}
+"""By plant.
+
+The weakest mode of an arm allows no more than 0.7 Hz.  The light rod of the rig has a stiff and
 well damped spring, allows 6 Hz, and at 5 Hz holds the sines of its bench against dry friction.
-Its step is missed, by 1.6 mm (2.0 mm behind an EKF) where 1 mm is asked, and so is the arm's, by
-7.7 deg where 1 is.
-"""
-
-TRACKING_S = {"crr_arm": 0.05, "servo_drive": 0.05}
-"""Tracking times of tuned gains where none is asked for, by plant; elsewhere that of the gains.
-
-On these two the valve is at its limit for the one sample in which a reference jumps.  The few
-millivolts that a short time takes from the integral there bring the nominal plants nearer: the
-drive to 0.17 mm instead of 0.76, the arm to 7.7 deg instead of 8.6.  No rule: eight drives, seven
-of them drawn, end 4.9 mm away in the median, and 3.2 mm with the time of the gains.
+Steps end on the raw measurement and behind an EKF 0.4 and 0.8 mm away on the rig, 0.5 and 1.0 deg
+on the arm, 0.13 and 0.10 mm on the drive.  Stiction leaves them little room: eight drives, seven of
+them drawn, end 0.7 mm away in the median and 9 mm at worst, six arms 0.8 and 4 deg.
 """
 
 
 @dataclass(frozen=True, kw_only=True)
 class OwnTuning(TuningSpec):
-    """As the tuning of a mode; a bandwidth of 0 is the usual one of the plant.
+    """As the tuning of a mode; a bandwidth or periods of 0 are the usual ones of the plant.
 
     The integral is slow: what it gathers while an axis sticks throws the axis beyond its target.
     """
 
     bandwidth_hz: float = ranged(0.0)
-    integral_periods: float = 40.0
+    integral_periods: float = ranged(0.0)
 
-    def on(self, plant: str) -> TuningSpec:
-        """With the bandwidth of a plant."""
-        hz = self.bandwidth_hz or BANDWIDTHS_HZ.get(plant, USUAL_HZ)
-        return replace(self, bandwidth_hz=hz)
+    def on(self, usual: Usual) -> TuningSpec:
+        """With what is usual where nothing is asked for."""
+        hz = self.bandwidth_hz or usual.bandwidth_hz
+        periods = self.integral_periods or usual.integral_periods
+        return replace(self, bandwidth_hz=hz, integral_periods=periods)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,7 +98,7 @@ class AxisPidSpec:
         Gains of one's own in place of the tuning.
     setpoint, setpoint_rate
         Shares of the reference in P and in D.  What the first takes from a step comes in by the
-        integral, whose usual time of 9 s on a drive is long: give it fewer ``integral_periods``.
+        integral, whose usual time of 4 s on a drive is long: give it fewer ``integral_periods``.
     feedforward_share
         Of the opening of the wanted motion; friction is compensated by it too.
     filter_s, span
@@ -100,9 +107,9 @@ class AxisPidSpec:
         A sine on the opening; none by default.
     tracking_time_s
         Of back-calculation, where the valve is at its limit; 0 is the integral time of the gains,
-        or that of the plant in ``TRACKING_S``.
+        or that of the plant in ``USUAL``.
     standing_per_s
-        In place of ``turn_per_s`` of the motion while the reference stands.
+        In place of ``turn_per_s`` of the motion while the reference stands; 0 is the usual one.
     """
 
     sample_time_s: float = 1e-3
@@ -116,13 +123,14 @@ class AxisPidSpec:
     dither: Dither = field(default_factory=Dither)
     tracking_time_s: float = ranged(0.0)
     smooth_v: float = 0.01
-    standing_per_s: float = ranged(20.0)
+    standing_per_s: float = ranged(0.0)
     motion: InRanges = field(default_factory=lambda: InRanges(turn_per_s=5.0))
 
-    def parts(self, wide: float) -> PidParts:
-        """Those of an axis whose range is so wide."""
+    def parts(self, wide: float, usual: Usual) -> PidParts:
+        """Those of an axis whose range is so wide; gains of one's own have their own time."""
         lag, span = LowPassDerivative(self.filter_s), SpanDerivative(max(self.span, 1))
         derivative: Derivative = span if self.span else lag
+        tuned_s = 0.0 if self.gains.given else usual.tracking_time_s
         return PidParts(
             derivative=derivative,
             setpoint=self.setpoint,
@@ -130,10 +138,10 @@ class AxisPidSpec:
             feedforward_share=self.feedforward_share,
             turn_speed=self.motion.turn * wide,
             turn_per_s=self.motion.turn_per_s,
-            standing_per_s=self.standing_per_s,
+            standing_per_s=self.standing_per_s or usual.standing_per_s,
             limits=self.motion.limits(wide),
             dither=self.dither,
-            tracking_time_s=self.tracking_time_s,
+            tracking_time_s=self.tracking_time_s or tuned_s,
             smooth_v=self.smooth_v,
             sample_time_s=self.sample_time_s,
         )
@@ -150,13 +158,12 @@ def axis_pid(hybrid: HybridModel, spec: AxisPidSpec | None = None) -> TwoDegreeP
     """
     spec = spec or AxisPidSpec()
     ((_, wide),) = ranges_of(hybrid.plant)
-    parts = spec.parts(wide)
+    usual = USUAL.get(hybrid.plant.name, Usual())
+    parts = spec.parts(wide, usual)
     if spec.gains.given:
         own = _own(spec)
         return pid_with(hybrid, scheduled(hybrid, lambda mode: own), parts)
-    within_s = parts.tracking_time_s or TRACKING_S.get(hybrid.plant.name, 0.0)
-    tuning = spec.tuning.on(hybrid.plant.name)
-    return tuned_pid(hybrid, tuning, replace(parts, tracking_time_s=within_s))
+    return tuned_pid(hybrid, spec.tuning.on(usual), parts)
 
 
 def _own(spec: AxisPidSpec) -> PidGains:

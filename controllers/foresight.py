@@ -1,9 +1,10 @@
 """Laws behind an estimator that hands on the state which their opening will meet.
 
 The estimators of a plant with delayed commands carry their state on by what was sent and is under
-way (:mod:`estimators.ahead`), in whole samples.  On a mode that prediction is linear,
+way (:mod:`estimators.ahead`), over whole samples and then the rest.  On a mode that is linear,
 
-    x_ahead = F^m x + sum over k = 1 .. m of F^(m-k) G u(k - delay / T),   m = delay / T rounded
+    x_m = F^m x + sum over k = 1 .. m of F^(m-k) G u(k - delay / T),   delay = m T + rest
+    x_ahead = F_rest x_m + G_rest u(0)
 
 u counted in samples after the newest, between samples by interpolation.  So it is part of the law,
 whose memory the sent openings are; the delay itself is in the loop as any other.
@@ -28,6 +29,8 @@ from linearize.modes import HybridModel, Mode
 from workbench.contracts import Controller
 from workbench.plant import Plant
 from workbench.simulation import command_delay_s
+
+SLACK = 1e-6  # of a sample, as of the estimators
 
 
 @dataclass(frozen=True)
@@ -84,10 +87,24 @@ def foresighted(mode: Mode, law: Law, sample_time_s: float, delay_s: float) -> L
 def _ahead(mode: Mode, sample_time_s: float, delay_s: float) -> tuple[np.ndarray, np.ndarray]:
     """What state and sent openings, oldest first, do to the predicted state: (n, n), (n, kept)."""
     late, small = delay_s / sample_time_s, sampled(mode, sample_time_s)
-    kept = ceil(late - 1e-9) if round(late) else 0
-    index, reach = np.arange(kept) - (kept - 1), np.eye(len(small.F))
-    effects = np.zeros((len(small.F), kept))
-    for k in range(1, round(late) + 1):
-        sent = [np.interp(k - late, index, one) for one in np.eye(kept)]
+    whole = int(late + SLACK)
+    reach, effects = np.eye(len(small.F)), np.zeros((len(small.F), under_way(late)))
+    for k in range(1, whole + 1):
+        sent = sent_at(k - late, effects.shape[1])
         reach, effects = small.F @ reach, small.F @ effects + np.outer(small.G[:, 0], sent)
+    if late - whole > SLACK:
+        rest = sampled(mode, delay_s - whole * sample_time_s)
+        reach, effects = rest.F @ reach, rest.F @ effects
+        effects[:, -1] += rest.G[:, 0]
     return reach, effects
+
+
+def under_way(late: float) -> int:
+    """How many sent openings count, so many samples late."""
+    return ceil(late - SLACK)
+
+
+def sent_at(samples: float, kept: int) -> np.ndarray:
+    """Weights of the sent openings, oldest first, so many samples after the newest, (kept,)."""
+    index = np.arange(kept) - (kept - 1)
+    return np.array([np.interp(samples, index, one) for one in np.eye(kept)])

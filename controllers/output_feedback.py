@@ -2,6 +2,9 @@
 
     xhat = xpred + L (y - C xpred),   u = law(xhat),   xpred' = F xhat + G u
 
+Where commands come late the law is one of :mod:`controllers.foresight`, and the filter is told what
+has arrived, as :mod:`estimators.ahead` tells it: u(-delay / T) in place of u.
+
 The filters that run (:mod:`estimators`) follow the nonlinear plant; near a mode's point they tend
 to this one, so its margins are those of the whole loop there.  LQG has no margins of its own by
 right: they must be looked at.
@@ -16,6 +19,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from controllers.foresight import sent_at, under_way
 from controllers.margins import Law
 from linearize.discrete import sampled
 from linearize.modes import Mode
@@ -27,6 +31,7 @@ def lqg_law(
     process_noise: Mapping[str, float],
     measurement_noise: Mapping[str, float],
     sample_time_s: float,
+    delay_s: float = 0.0,
 ) -> Law:
     """The law from the mode's states, as its outputs show them, to the opening.
 
@@ -36,19 +41,25 @@ def lqg_law(
         Standard deviation that a state gains per square root of a second.
     measurement_noise
         Standard deviation by output.
+    delay_s
+        Of the commands, which the law foresees: its memory ends with the sent openings.
     """
     small, n, m = sampled(mode, sample_time_s), len(mode.state_names), len(law.A)
     correct = kalman_gain(mode, process_noise, measurement_noise, sample_time_s) @ mode.C
-    kept = np.eye(n) - correct
-    G, D = small.G[:, 0], law.D
-    A = np.block(
-        [
-            [(small.F + np.outer(G, D)) @ kept, np.outer(G, law.C)],
-            [law.B @ kept, law.A],
-        ]
-    )
-    B = np.vstack([(small.F + np.outer(G, D)) @ correct, law.B @ correct])
+    kept, D = np.eye(n) - correct, law.D
+    by_state, by_memory = _arriving(law, delay_s / sample_time_s)
+    F, from_memory = small.F + small.G @ by_state, small.G @ by_memory
+    A = np.block([[F @ kept, from_memory], [law.B @ kept, law.A]])
+    B = np.vstack([F @ correct, law.B @ correct])
     return Law(A, B.reshape(n + m, n), np.concatenate([D @ kept, law.C]), D @ correct)
+
+
+def _arriving(law: Law, late: float) -> tuple[np.ndarray, np.ndarray]:
+    """What arrives over the coming sample, from xhat, (1, n), and the law's memory, (1, m)."""
+    *older, now = sent_at(-late, under_way(late) + 1)
+    by_state, by_memory = now * law.D, now * law.C
+    by_memory[len(by_memory) - len(older) :] += older
+    return by_state[None, :], by_memory[None, :]
 
 
 def kalman_gain(

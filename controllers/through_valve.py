@@ -53,12 +53,12 @@ class ThroughValve:
         """The command for an opening, led where the spool lags, shape (1,).
 
         u = z + (u_wanted - z) T / T_led, so that the spool z, as estimated, moves with the time
-        constant T_led instead of T.
+        constant T_led instead of T.  An estimator that does not tell of the spool leads nothing.
         """
         wanted = self.shut if opening_v == 0.0 else self.command(opening_v)
-        if self.lag is None:
+        if self.lag is None or (spool_v := f"{self.lag.name}.lagged_v") not in estimate.names:
             return wanted
-        spool = estimate.pick([f"{self.lag.name}.lagged_v"])
+        spool = estimate.pick([spool_v])
         led = spool + (wanted - spool) * max(float(self.lag.time_constant_s) / LED_S, 1.0)
         return np.clip(led, self.lower_v, self.upper_v)
 

@@ -6,9 +6,12 @@
 The integral is kept in volts and begins with K_p (1 - b) r, so that an axis at rest on its target
 stays there; what b takes from a later step comes in by the integral, within K_p / K_i.  Where the
 gains change with the mode, it takes over what P and D lose or gain by that, so that the opening
-does not jump (bumpless transfer).  Where the valve is at its limit, it follows what was sent
-(back-calculation), within T_i = K_p / K_i by default: in a shorter time a large step drives it
-against the error, and it needs T_i to come back.
+does not jump (bumpless transfer).  They do so under the reference of the last sample: a step that
+turns the direction would else leave its size times the difference of both K_p behind.
+
+Where the valve is at its limit, the integral follows what was sent (back-calculation), within
+T_i = K_p / K_i by default: in a shorter time a large step drives it against the error, and it needs
+T_i to come back.
 
 The opening of the wanted motion comes from the modes and builds the pressures that belong to it:
 those against dry friction and gravity in that direction (friction compensation), and those of speed
@@ -49,6 +52,11 @@ class PidGains:
     derivative: float
     setpoint: float = 1.0
     setpoint_rate: float = 0.0
+
+    def direct_v(self, asked: tuple[float, float], place: float, slope: float) -> float:
+        """P + D of a reference with its slope, and of the measured place with its own."""
+        along, rate = self.setpoint * asked[0] - place, self.setpoint_rate * asked[1] - slope
+        return self.proportional * along + self.derivative * rate
 
     def held_v(self, place: float) -> float:
         """The integral with which an axis at rest on its target stays there."""
@@ -97,8 +105,9 @@ class Feedforward:
 class PidMemory:
     """What a sample leaves for the next.
 
-    The integral is in V, ``slopes`` is of the derivative, gains are those of last time, and
-    pressures those of the wanted motion, None before the first sample that asks for any.
+    The integral is in V, ``slopes`` is of the derivative, gains and what was asked (see
+    :meth:`PidGains.direct_v`) are those of last time, and pressures those of the wanted motion,
+    None before the first sample that asks for any.
     """
 
     integral_v: float
@@ -106,6 +115,7 @@ class PidMemory:
     gains: PidGains
     samples: int
     pressures: np.ndarray | None = None
+    asked: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,21 +153,20 @@ class TwoDegreePid(OnMeasurement):
         memory = last.memory or PidMemory(begun_v, settled(self._filter, y), now, 0)
         slope = float(C @ memory.slopes + D * y)
 
-        def proportional_and_rate(gains: PidGains) -> float:
-            along = gains.setpoint * reference[0, 0] - y
-            rate = gains.setpoint_rate * moving[0] - slope
-            return gains.proportional * along + gains.derivative * rate
-
-        direct = proportional_and_rate(now)
-        taken_over = proportional_and_rate(memory.gains) - direct if now.integral else 0.0
-        integral = memory.integral_v + taken_over
+        seen, asked = (float(y), slope), (float(reference[0, 0]), float(moving[0]))
+        direct = now.direct_v(asked, *seen)
+        integral = memory.integral_v
+        if now.integral:
+            before = memory.asked or asked
+            integral += memory.gains.direct_v(before, *seen) - now.direct_v(before, *seen)
         integral += dt * now.integral * float(reference[0, 0] - y)
         sent_ahead, pressures = self._ahead_v(float(reference[0, 0]), ahead, moving, memory)
         wanted = direct + integral + sent_ahead
         opening = float(np.clip(wanted, *self.valve.openings_v))
         integral += self._share_followed(now) * (opening - wanted)
         sent = self.valve.sent(opening + self.dither.at(memory.samples * dt), estimate)
-        kept = PidMemory(integral, A @ memory.slopes + B * y, now, memory.samples + 1, pressures)
+        slopes, samples = A @ memory.slopes + B * y, memory.samples + 1
+        kept = PidMemory(integral, slopes, now, samples, pressures, asked)
         return Command(sent, kept, {"opening_v": opening, "integral_v": integral})
 
     def _share_followed(self, gains: PidGains) -> float:

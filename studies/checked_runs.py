@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import inf, isfinite, isnan, nan
+from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from studies.many_runs import Setup, closed, read, rows_of
 from studies.robustness import Line, Robustness
 from studies.shift_check import Shift, ShiftCheck
 from studies.specification import Specification
+from studies.stayed_away import stayed_away
 from studies.verdicts import Figures, Judged, Verdict, judge
 from studies.workers import Workers
 from workbench.rig import Rig
@@ -99,17 +100,21 @@ class CheckedRuns:
 
     @property
     def met(self) -> bool:
-        """True when every run meets every line; without a specification, the goal."""
+        """True when every run gets there and meets every line; without a specification, the goal.
+
+        What stays where it is takes no air and keeps all limits.
+        """
         if self.judged:
-            return self.judged.met
+            return self.judged.met and not self.unreached
         return not self.lost and all(row.reached is not False for row in self.found.rows)
 
     @property
     def unreached(self) -> tuple[str, ...]:
-        """The steps of which some run never rose, each with its number of runs where there are."""
+        """What some run never came near, each with its number of runs where there are several."""
         runs: dict[str, set[int]] = {}
+        asked = self.spec.asked if self.spec else ()
         for number, loop in self._loops():
-            if "metrics" in loop and _never_rose(read(loop["metrics"])):
+            if "metrics" in loop and stayed_away(loop["scenario"], read(loop["metrics"]), asked):
                 runs.setdefault(loop["scenario"], set()).add(number)
         several = f" in {{}} of {len(self.rows)} runs" if self.several else ""
         return tuple(scenario + several.format(len(those)) for scenario, those in runs.items())
@@ -148,7 +153,8 @@ class CheckedRuns:
             next(held) if "metrics" in loop else {**known, **self._lost_entry(number, loop)}
             for number, loop in self._loops()
         ]
-        document |= self.judged.document if self.judged else {}
+        if self.judged:
+            document |= self.judged.document | {"in_specification": self.met}
         if self.several:
             lines = self._lines() if self.judged else self._goals()
             document["robustness"] = [self._entry(*each) for each in lines]
@@ -229,12 +235,6 @@ class CheckedRuns:
             "influences": moved,
             "worst_run": int(line.worst[0]) + 1,
         }
-
-
-def _never_rose(metrics: Mapping[str, Any]) -> bool:
-    """True for a step that did not come near its target; a sine has an amplitude instead."""
-    moving = isfinite(metrics.get("amplitude_m", nan))
-    return not moving and isnan(metrics.get("figures", metrics).get("rise_s", 0.0))
 
 
 def _kind(rig: Rig) -> tuple[type[Checked], type[Metrics | Shift | Followed]]:

@@ -15,6 +15,7 @@ from linearize.standard import POSITION, PRESSURES, SUPPLY
 from studies.scenarios import LATE_S, SAMPLE_TIME_S, Scenario
 from studies.text import clock, columns, until
 from workbench.closed_loop import LoopRecord
+from workbench.effects.timing import sent_at_s
 from workbench.effects.valve_command import DeadZone
 from workbench.plant import Plant
 
@@ -179,7 +180,10 @@ def _shut(plant: Plant, name: str) -> tuple[float, float]:
 
 
 def air_used_kg(plant: Plant, record: LoopRecord, sample_time_s: float = SAMPLE_TIME_S) -> float:
-    """Air taken from the supply: the flows that leave its balance, summed over the run."""
+    """Air taken from the supply: the flows that leave its balance, summed over the run.
+
+    Under the commands as they arrived; those that were sent belong to later states.
+    """
     import casadi as ca
 
     model, (_, d, p) = plant.model, plant.nominal
@@ -187,8 +191,22 @@ def air_used_kg(plant: Plant, record: LoopRecord, sample_time_s: float = SAMPLE_
         flow for (_, kind, at), flow in model.flows.items() if kind == "MassFlow" and at == "supply"
     )
     taken = ca.Function("taken", [*model.symbols], [-leaving])
-    u, x = record.recording.rows(model.commands), record.recording.rows(model.states)
+    u, x = _arrived(plant, record, sample_time_s), record.recording.rows(model.states)
     return float(taken.map(x.shape[1])(x, u, d, p).full().sum() * sample_time_s)
+
+
+def _arrived(plant: Plant, record: LoopRecord, sample_time_s: float) -> np.ndarray:
+    """The commands behind all that delays them, nominal before the first, shape (n_u, n)."""
+    samples = np.arange(len(record.recording))
+    rows = [
+        np.interp(
+            sent_at_s(plant.members, name, sample_time_s * samples) / sample_time_s,
+            [-1, *samples],
+            [nominal, *record.recording[name]],
+        )
+        for name, nominal in zip(plant.model.commands, plant.nominal[0], strict=True)
+    ]
+    return np.array(rows)
 
 
 def _violation_s(plant: Plant, record: LoopRecord, limits: Sequence[Limit] = ()) -> float:

@@ -1,4 +1,7 @@
-"""What of a design is told as a warning: loops that are unstable, or bear hardly anything."""
+"""What of a design is told as a warning: loops that are unstable, or bear hardly anything.
+
+And a setpoint weight whose rest comes in slowly: the axis stands still far from its target.
+"""
 
 from __future__ import annotations
 
@@ -6,18 +9,36 @@ from collections.abc import Iterator
 from math import degrees, radians
 from typing import TYPE_CHECKING
 
+from controllers.two_degree_pid import PidGains, TwoDegreePid
 from studies.text import number
 
 if TYPE_CHECKING:
+    from controllers.scheduled import Schedule
     from studies.design_report import DesignReport, LawReport
 
 LEAST_PHASE_RAD = radians(30.0)  # of the textbooks' 30 to 60 deg
+LONGEST_S = 1.0  # in which a step's rest may come in: those of `check` are watched for 1.2 s
 
 
 def design_doubts(found: DesignReport) -> Iterator[str]:
     """One sentence for each; the tables of the design have all modes."""
+    made = found.design.controller
     for part in found.laws:
-        yield from _doubts(part, found.design.controller.sample_time_s)
+        yield from _doubts(part, made.sample_time_s)
+    if isinstance(made, TwoDegreePid):
+        yield from _withheld(made.gains)
+
+
+def _withheld(gains: Schedule[PidGains]) -> Iterator[str]:
+    """What a setpoint weight takes from a step, where the integral is slow to give it back."""
+    for slow in (*gains.forward, *gains.backward):
+        within_s = slow.proportional / slow.integral if slow.integral else 0.0
+        if slow.setpoint != 1.0 and within_s > LONGEST_S:
+            share = f"{number(100.0 * abs(1.0 - slow.setpoint), 3)} % of every step"
+            what = f"a setpoint weight of {slow.setpoint:g} leaves {share} to the integral"
+            time = f"whose time is {number(within_s, 3)} s"
+            yield f"{what}, {time}: ask for fewer integral_periods"
+            return
 
 
 def _doubts(part: LawReport, sample_time_s: float) -> Iterator[str]:

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from studies.instability_text import Growth, growth_of
 
 if TYPE_CHECKING:
+    from controllers.axis import Axis
     from controllers.certificate import Certificate
     from controllers.design_file import Design
     from controllers.foresight import Delays
     from controllers.margins import Law, Margins
     from controllers.scheduled import Schedule
     from linearize.modes import Mode
+    from workbench.plant import Plant
 
 
 @dataclass(frozen=True)
@@ -25,7 +27,8 @@ class LawReport:
     delays       what is late in the loop that the margins are for
     growth       by unstable mode, what its loop does
     certificate  across the modes; it takes what is foreseen as foreseen exactly
-    filtered     margins with the steady Kalman filter of each mode, where that is known
+    filtered     margins with the steady Kalman filter of each mode in the loop, delays included;
+                 none of a law that has no filter before it
     """
 
     body: str
@@ -79,24 +82,33 @@ def _of_parts(
             margins=by_mode,
             growth={name: growth for name, growth in growing.items() if growth},
             certificate=certificate(exact, sample_time_s),
-            filtered=_filtered(found, laws) if delays.foreseen and not delays.both_s else (),
+            filtered=_filtered(found, ahead, delays, axis) if delays.foreseen else (),
         )
 
 
-def _filtered(found: Design, laws: Schedule[Law]) -> tuple[Margins, ...]:
-    """Margins on a slide whose estimator has the usual noise; it does not foresee a delay."""
+def _filtered(
+    found: Design, laws: Schedule[Law], delays: Delays, axis: Axis | None
+) -> tuple[Margins, ...]:
+    """Margins behind filters for the noise of `check`, which know what commands have arrived."""
     from controllers.margins import margins
     from controllers.output_feedback import lqg_law
     from controllers.scheduled import with_modes
-    from linearize.standard import SLIDE_MODES
-    from studies.closed_loop_check import PROCESS_NOISE, noise_of
 
-    if found.plant.name not in SLIDE_MODES:
-        return ()
-    noise, sample_time_s = noise_of(found.plant), found.controller.sample_time_s
+    sample_time_s, noises = found.controller.sample_time_s, _noises(found.plant)
 
     def behind_filter(mode: Mode, law: Law) -> Law:
-        return lqg_law(mode, law, PROCESS_NOISE, noise, sample_time_s)
+        return lqg_law(mode, law, *noises, sample_time_s, delays.commands_s)
 
-    filtered = with_modes(found.hybrid, laws, behind_filter)
-    return tuple(margins(found.hybrid, filtered, sample_time_s))
+    filtered = with_modes(found.hybrid, laws, behind_filter, axis)
+    return tuple(margins(found.hybrid, filtered, sample_time_s, delays.both_s, axis))
+
+
+def _noises(plant: Plant) -> tuple[Mapping[str, float], Mapping[str, float]]:
+    """Of the process and the sensors in `check`, by state and by output."""
+    from studies.closed_loop_check import PROCESS_NOISE, noise_of
+    from studies.following import BENCHES
+
+    if plant.name in BENCHES:
+        bench = BENCHES[plant.name]
+        return bench.process(plant), bench.noise(plant)
+    return PROCESS_NOISE, noise_of(plant)

@@ -1,6 +1,7 @@
 """What a check over many drawn plants tells: lines, worst runs, influences, figures."""
 
 import csv
+import json
 from types import SimpleNamespace
 
 import numpy as np
@@ -130,6 +131,49 @@ def test_a_step_that_never_rose_overshoots_swings_and_settles_out_of_specificati
     assert answer.exit_code == code
     told = "not reached: step\nout of specification: overshoot, limit_cycle\n"
     assert answer.stderr == (told if code else "")
+
+
+@pytest.mark.parametrize(
+    "line", ['air = "4 g"', "switches = 9", '[limits]\n"chamber_a.pressure" = "9 bar"']
+)
+@pytest.mark.parametrize(("rise_s", "code"), [(float("nan"), 1), (0.1, 0)])
+def test_what_stays_where_it_is_does_not_meet_a_specification_of_air_switches_or_limits(
+    lq, monkeypatch, tmp_path, line, rise_s, code
+):
+    """A shut valve takes no air: the check ended with 0 and said beside it that nothing moved."""
+    stays = metrics(rise_s=rise_s, air_kg=0.0, switches=0.0)
+    monkeypatch.setattr(Loops, "once", lambda loops, plant, seed: Check((stays,), (record(),)))
+    rig, spec, told = (tmp_path / name for name in ("rig.toml", "spec.toml", "check.json"))
+    rig.write_text('plant = "servo_drive"\n')
+    spec.write_text(f"{line}\n")
+    asked = ("--spec", spec, "--scenario", "step", "--json", told, "-q")
+    answer = call("check", rig, lq, *asked)
+
+    assert answer.exit_code == code, answer.output
+    assert json.loads(told.read_text())["in_specification"] is (code == 0)
+    assert answer.stderr == ("not reached: step\n" if code else "")
+
+
+@pytest.mark.parametrize(
+    ("lines", "rmse_m", "code"),
+    [
+        ('air = "4 g"', 0.03, 1),
+        ('air = "4 g"', 0.003, 0),
+        ('air = "4 g"\ntracking_error = "40 mm"', 0.03, 0),
+    ],
+)
+def test_a_lost_sine_is_missed_unless_a_line_says_how_closely_it_is_followed(
+    lq, monkeypatch, tmp_path, lines, rmse_m, code
+):
+    nan = float("nan")
+    lost = metrics(scenario="sine", rise_s=nan, amplitude_m=0.08, way_m=nan, rmse_m=rmse_m)
+    monkeypatch.setattr(Loops, "once", lambda loops, plant, seed: Check((lost,), (record(),)))
+    rig, spec = tmp_path / "rig.toml", tmp_path / "spec.toml"
+    rig.write_text('plant = "servo_drive"\n')
+    spec.write_text(f"{lines}\n")
+    answer = call("check", rig, lq, "--spec", spec, "--scenario", "sine", "-q")
+
+    assert answer.exit_code == code, answer.output
 
 
 def test_of_several_runs_those_whose_step_never_rose_are_counted(lq, monkeypatch):

@@ -81,10 +81,20 @@ def test_margins_are_told_without_and_with_a_filter_and_for_which_samples():
     assert phases == pytest.approx([54.2, 38.2], abs=0.1)
 
 
-def test_a_law_on_the_measurement_or_behind_a_delay_has_no_margins_with_a_filter():
-    """The one has none in its loop, and what the other's sent openings do the filter must know."""
+def test_a_law_on_the_measurement_has_no_margins_with_a_filter():
     assert document("axis-pid", servo_drive())["laws"][0]["margins_with_kalman_filter"] == []
-    assert document("axis-lq", crr_arm())["laws"][0]["margins_with_kalman_filter"] == []
+
+
+def test_margins_with_a_filter_are_told_behind_delays_and_of_every_axis():
+    """They were left out of a rig with a network and of a drive whose commands come late."""
+    late = servo_drive().with_values({"command_delay.delay_s": 3e-3})
+    for method, plant in (("lq", late), ("axis-lq", crr_arm())):
+        (law,) = document(method, plant)["laws"]
+        known, filtered = law["margins"], law["margins_with_kalman_filter"]
+
+        assert [each["mode"] for each in filtered] == [each["mode"] for each in known]
+        assert law["delays_s"]["commands"] > 0.0 and all(each["stable"] for each in known)
+        assert all(f["phase_deg"] != k["phase_deg"] for f, k in zip(filtered, known, strict=True))
 
 
 @pytest.mark.parametrize(
@@ -100,6 +110,15 @@ def test_a_law_on_the_measurement_or_behind_a_delay_has_no_margins_with_a_filter
             ],
         ),
         ("lq", {}, []),
+        (
+            "axis-pid",
+            {"setpoint": 0.7},
+            [
+                "a setpoint weight of 0.7 leaves 30 % of every step to the integral, whose time is "
+                "4.14 s: ask for fewer integral_periods"
+            ],
+        ),
+        ("axis-pid", {"setpoint": 0.7, "tuning": {"integral_periods": 5.0}}, []),
     ],
 )
 def test_loops_that_bear_hardly_anything_are_doubts(method, numbers, said):

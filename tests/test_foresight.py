@@ -7,8 +7,11 @@ from commands import call
 from controllers.design_file import design, write_design
 from controllers.foresight import delays_of, foresighted
 from controllers.margins import both_ways_s, closed, margins, margins_of
+from controllers.output_feedback import kalman_gain, lqg_law
 from controllers.scheduled import driven_modes
+from linearize.discrete import sampled
 from studies.checking import loops_of
+from studies.closed_loop_check import PROCESS_NOISE, noise_of
 from studies.design_report import design_report
 from studies.design_text import design_texts
 from studies.text import number
@@ -59,8 +62,27 @@ def test_a_foreseen_delay_takes_margins_although_it_leaves_the_poles(mode, law):
     assert [radius < 1.0 for radius in wrong_s] == [d < found.delay_s for d in NEAR]
 
 
-def test_less_than_half_a_sample_is_not_foreseen_as_the_estimators_do_not(mode, law):
-    assert foresighted(mode, law, DT, 0.4 * DT) is law
+@pytest.mark.parametrize("share", [0.4, 0.9])
+def test_a_part_of_a_sample_is_foreseen_as_the_estimators_do(mode, law, share):
+    """It was rounded, to none or to all of a sample: what the estimators no longer do."""
+    alone = np.linalg.eigvals(closed(mode, law, DT))
+    late = np.linalg.eigvals(closed(mode, foresighted(mode, law, DT, share * DT), DT, share * DT))
+
+    assert np.sort(abs(late))[-5:] == pytest.approx(np.sort(abs(alone)), rel=1e-6)
+
+
+@pytest.mark.parametrize("late", [0.0, 1.0, 2.0])
+def test_a_filter_that_is_told_what_arrives_leaves_the_poles_of_loop_and_filter(mode, law, late):
+    """Separation holds behind a foreseen delay too; a filter told what is sent would be off."""
+    noises = PROCESS_NOISE, noise_of(servo_drive())
+    delay_s = late * DT
+    filtered = lqg_law(mode, foresighted(mode, law, DT, delay_s), *noises, DT, delay_s)
+    L, small = kalman_gain(mode, *noises, DT), sampled(mode, DT)
+    alone = np.linalg.eigvals(closed(mode, law, DT))
+    own = np.linalg.eigvals(small.F @ (np.eye(4) - L @ mode.C))
+    there = abs(np.linalg.eigvals(closed(mode, filtered, DT, delay_s)))
+
+    assert np.sort(there)[-9:] == pytest.approx(np.sort(abs(np.append(alone, own))), rel=1e-5)
 
 
 @pytest.mark.parametrize(
