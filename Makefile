@@ -54,7 +54,7 @@ endif
 lock:
 	@uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url \
 	  --custom-compile-command "make lock" \
-	  --extra build --extra cluster --extra page --extra test \
+	  --extra automotive --extra build --extra cluster --extra page --extra test \
 	  pyproject.toml -o requirements.lock
 	@echo ziglang | uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
 	  --no-emit-index-url --custom-compile-command "make lock" - -o compiler.lock

@@ -24,7 +24,7 @@ def _cell(row: int, column: int, value: str):
 
 BAD = {
     "empty file": (lambda s: " \n", "", "run.csv: the file is empty"),
-    "no text": (lambda s: "PK\3\4\0\0" + s, "", "is no text; expected a CSV or MAT file"),
+    "no text": (lambda s: "PK\3\4\0\0" + s, "", "is no text; expected a CSV, MAT or MDF file"),
     "picture": (lambda s: "\x89PNG\r\n\x1a\n\x01\x02IHDR" + s, "", "is no text; expected a CSV"),
     "spoiled cell": (_cell(9, 2, "\x00\x07" * 50), "", "'\\x00\\x07"),
     "names only": (lambda s: s.split("\n")[0], "", "no rows of numbers"),

@@ -240,8 +240,8 @@ def test_a_row_of_units_that_says_another_one_than_the_rig_is_refused(tmp_path):
 
     said = str(error.value)
     for told, unit in (("ms", "s"), ("bar_gauge", "bar"), ("m", "mm")):
-        assert f"the row of units says {told}, the rig {unit};" in said
-    assert "the row of units says V" not in said
+        assert f"the file says {told}, the rig {unit};" in said
+    assert "the file says V" not in said
 
 
 def test_words_below_the_names_that_are_no_units_say_nothing(tmp_path):

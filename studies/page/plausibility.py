@@ -17,10 +17,8 @@ from workbench.comparison.course import course_of
 from workbench.consistency import examined
 from workbench.consistency.findings import Weight
 from workbench.fitting.identifiability import identifiability
+from workbench.reading.formats import table_of
 from workbench.reading.grid import LONGEST_STEP
-from workbench.reading.matlab import matlab_table
-from workbench.reading.table import Table
-from workbench.reading.text_table import text_table
 from workbench.recording import Recording
 from workbench.rig import Rig
 from workbench.saturation import saturated
@@ -62,13 +60,8 @@ def findings_of(
 
 def column_names(rig: Rig, path: Path) -> tuple[str, ...]:
     """The columns of a file, by name or else by number."""
-    table = _table(rig, path)
+    table = table_of(path, rig.reader)
     return tuple(table.names) or tuple(map(str, range(1, table.n_columns + 1)))
-
-
-def _table(rig: Rig, path: Path) -> Table:
-    mat = path.suffix.lower() == ".mat"
-    return matlab_table(path) if mat else text_table(path, rig.reader)
 
 
 def _time(rig: Rig, path: Path, recording: Recording) -> Iterator[Finding]:
@@ -76,7 +69,7 @@ def _time(rig: Rig, path: Path, recording: Recording) -> Iterator[Finding]:
     yield Finding("length", f"{dt * (n - 1):.5g} s, {n} samples of {1e3 * dt:.4g} ms")
     clock = rig.reader.time
     if clock.step_s is None:
-        table = _table(rig, path)
+        table = table_of(path, rig.reader)
         column = table.find(clock.column or "time", "time")
         (stamps,) = table.load([column])
         steps = np.diff(scale(clock.unit, "time_s").to_si(stamps)) / dt

@@ -35,6 +35,7 @@ from studies.page.traces import TIME, Traces
 from studies.page.verbs import named, require_rig, require_train, with_checked
 from studies.text import labelled
 from workbench.plants import PLANTS
+from workbench.reading.formats import BINARY
 from workbench.units import display_scale
 
 if TYPE_CHECKING:
@@ -42,7 +43,7 @@ if TYPE_CHECKING:
 
     from studies.page.view import Page
 
-ENDINGS = (".csv", ".txt", ".dat", ".mat")
+ENDINGS = (".csv", ".txt", ".dat", *BINARY)
 PLANT = "one of the catalogue"
 NONE = "choose here, or type a path"
 SMALL, TALL = 92, 120

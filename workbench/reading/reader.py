@@ -11,11 +11,10 @@ import numpy as np
 from workbench.differentiator import WINDOW, derivative
 from workbench.errors import InputError, Message, listed
 from workbench.plant import Plant
+from workbench.reading.formats import table_of
 from workbench.reading.grid import Grid, missing_stretch, uniform_grid
-from workbench.reading.matlab import matlab_table
 from workbench.reading.plausible import cannot_be, warn_of_sensors
 from workbench.reading.table import RecordingWarning, Table
-from workbench.reading.text_table import text_table
 from workbench.reading.time_unit import warn_of_time_unit
 from workbench.recording import Recording
 from workbench.recording_format import derived_channels
@@ -37,7 +36,7 @@ def read_recording(rig: Rig, path: Path | str) -> Recording:
         With everything that is wrong with the file, each with its place.
     """
     path = Path(path)
-    table = matlab_table(path) if path.suffix.lower() == ".mat" else text_table(path, rig.reader)
+    table = table_of(path, rig.reader)
     columns = _columns(rig, table)
     _require_units(rig, table, columns)
     numbers = sorted(set(columns.values()))
@@ -130,7 +129,7 @@ def _shared(table: Table, columns: dict[str, int]) -> list[Message]:
 
 
 def _require_units(rig: Rig, table: Table, columns: dict[str, int]) -> None:
-    """Refuse a row of units that says another one than the rig; what is no unit says nothing.
+    """Refuse a unit of the file that is another one than the rig says; what is none says nothing.
 
     A logger writes bar for a gauge too: only one that says gauge contradicts an absolute pressure.
     """
@@ -142,7 +141,7 @@ def _require_units(rig: Rig, table: Table, columns: dict[str, int]) -> None:
         with suppress(UnitError):
             own = unit if told.endswith(GAUGE) else unit.removesuffix(GAUGE)
             if told and scale(told, quantity) != scale(own, quantity):
-                what = f"the row of units says {told}, the rig {unit or 'none'}"
+                what = f"the file says {told}, the rig {unit or 'none'}"
                 expected = (
                     f"unit = '{told}' in the rig's [recording], or {unit or 'none'} in the file"
                 )

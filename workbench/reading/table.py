@@ -22,7 +22,7 @@ class Table:
     names   what the columns are called; empty where they are only numbered
     load    the columns with these numbers (from 0), shape (n_columns, n_rows)
     place   where a row (from 0) stands in the file, for people: ``line 17``
-    units   what the file says the columns are in; empty where it has no row of units
+    units   what the file says the columns are in; empty where it says nothing
     """
 
     file: str

@@ -39,7 +39,7 @@ def text_table(path: Path, reader: RecordingFormat) -> Table:
     """
     file, lines = str(path), decoded(open_bytes(path)).splitlines()
     if _binary(lines):
-        raise InputError(Message("is no text", expected="a CSV or MAT file", file=file))
+        raise InputError(Message("is no text", expected="a CSV, MAT or MDF file", file=file))
     rows = [
         (number, line)
         for number, line in enumerate(lines, start=1)
