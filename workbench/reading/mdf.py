@@ -10,10 +10,13 @@ Source: ASAM MDF 4.2, channel groups and master channels.
 
 from __future__ import annotations
 
+import gc
+import sys
 from collections.abc import Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from traceback import clear_frames
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -82,7 +85,18 @@ def _opened(path: Path) -> Iterator[Any]:
         raise
     except Exception as error:  # asammdf raises what it pleases on a broken file
         what = f"is no MDF file that can be read: {error}"
+        _drop_half_opened(error)
         raise InputError(Message(what, file=str(path))) from None
+
+
+def _drop_half_opened(error: Exception) -> None:
+    """Let go of what asammdf opened half-way, whose complaint on its end is for nobody to read."""
+    hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
+    try:
+        clear_frames(error.__traceback__)
+        gc.collect()
+    finally:
+        sys.unraisablehook = hook
 
 
 def _clock_name(opened: Any) -> str:
