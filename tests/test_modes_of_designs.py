@@ -49,7 +49,7 @@ def test_every_mode_that_a_design_names_is_among_those_listed(tmp_path, rig):
     listed = call("modes", path, "--for", "axis-lq", *BRIEF).stdout
     standard = call("modes", path, *BRIEF).stdout
     rows = [line for line in designed.splitlines() if line.startswith("slide ")]
-    names = [" ".join(line.split()[: 5 if "end" in line else 3]) for line in rows]
+    names = {" ".join(line.split()[: 5 if "end" in line else 3]) for line in rows}
 
     assert len(names) == 6
     for name in names:
