@@ -8,6 +8,7 @@ import pytest
 
 from workbench.effect import Effect, Force
 from workbench.effects.bristle_friction import ElastoPlastic, LuGre
+from workbench.effects.friction_thermal import ThermalFriction
 from workbench.fitting.starts import guessed_states
 from workbench.parts import Body
 from workbench.plant import Plant, Signal
@@ -68,3 +69,21 @@ def test_a_seal_is_guessed_as_warm_as_its_strokes_make_it():
     assert run[WARMTH][-1] > 1.0
     assert np.abs(guess - run[WARMTH])[row].max() < 0.05 * run[WARMTH][-1]
     assert (deviation[row] < 1.0).all()
+
+
+def test_no_window_has_a_warmth_of_its_own():
+    """A free one would be a free friction in each window, which imitates what changes by stroke.
+
+    What another warming time would have made of the strokes is within the deviation, though.
+    """
+    time_s = 1e-3 * np.arange(60_001)
+    speed_m_s = 0.3 * np.cos(2 * np.pi * 0.5 * time_s)
+    seen = {"time_s": time_s, "slide.velocity_m_s": speed_m_s}
+    thermal = ThermalFriction(name="friction_thermal", body="slide", softening_n_k=1.0)
+    slower = replace(thermal, warming_time_s=1.2 * thermal.warming_time_s)
+
+    (warmth, deviation), (other, _) = (each.guess(seen)["warmer_k"] for each in (thermal, slower))
+
+    assert warmth[-1] > 3.0
+    assert (np.abs(other - warmth) < deviation).all()
+    assert deviation[:10_000].max() < 0.02 and deviation[-1] < 0.05 * warmth[-1]
