@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 CLOCK = "time"  # where a file does not name its masters
+HEAD = 64  # bytes of the block that every such file begins with
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,7 @@ def mdf_table(path: Path) -> Table:
     InputError
         If asammdf is not there, or the file cannot be read or holds no numbers.
     """
-    open_bytes(path)
+    open_bytes(path, HEAD)
     file = str(path)
     with _opened(path) as opened:
         clock, channels = _clock_name(opened), [*_channels(opened)]
@@ -113,9 +114,10 @@ def _channels(opened: Any) -> Iterator[_Channel]:
         for index, channel in enumerate(group.channels):
             if index == master:
                 continue
-            values = opened.get(group=number, index=index).samples
-            if values.ndim == 1 and values.dtype.kind in "biuf" and len(values):
-                yield _Channel(channel.name, channel.unit or "", number, index, len(values))
+            samples = int(group.channel_group.cycles_nr)
+            first = opened.get(group=number, index=index, record_count=1).samples
+            if first.ndim == 1 and first.dtype.kind in "biuf" and samples:
+                yield _Channel(channel.name, channel.unit or "", number, index, samples)
 
 
 def _on(clock_s: np.ndarray, opened: Any, channel: _Channel) -> np.ndarray:

@@ -52,8 +52,8 @@ class Table:
         return Message(what, channel, expected, near, file=self.file)
 
 
-def open_bytes(path: Path) -> bytes:
-    """What a file holds.
+def open_bytes(path: Path, most: int = -1) -> bytes:
+    """What a file holds: all of it, or its first bytes, ``most`` of them.
 
     Raises
     ------
@@ -61,7 +61,8 @@ def open_bytes(path: Path) -> bytes:
         If there is no such file (naming one that looks like it), or nothing in it.
     """
     try:
-        content = path.read_bytes()
+        with path.open("rb") as opened:
+            content = opened.read(most)
     except OSError as error:
         raise unreadable(path, error) from None
     if not content.strip():
