@@ -177,7 +177,7 @@ def _draw_balances(axes: Axes, where: Where) -> None:
 def _draw_dependence(axes: Axes, where: Where, dependence: Dependence) -> None:
     factor, label = _term(where)
     name = dependence.variable
-    per = 1.0 / display_scale(name).factor
+    per = 1.0 / display_scale(name.removeprefix(RATE)).factor
     centres, means, spreads = dependence.bins * np.array([[per], [factor], [factor]])
     band = {"color": BLUE, "alpha": 0.2, "linewidth": 0, "label": "one deviation in each bin"}
     axes.fill_between(centres, means - spreads, means + spreads, **band)
