@@ -19,6 +19,10 @@ from workbench.effect import (
     form,
     strength,
 )
+from workbench.units import STANDARD_ATMOSPHERE_PA
+
+GUESSED_PA = 1e3  # of what the wall has followed, where the pressures before are recorded
+UNSETTLED_PA = 1e5  # as far as a wall may be from settled when the recording begins
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,11 +58,23 @@ class BellowsCreep(Effect):
     def states(self) -> Iterator[State]:
         yield State("followed_pa", initial=0.0, scale=1e5)
 
-    def guess(self, seen: Mapping[str, np.ndarray]) -> dict[str, tuple[np.ndarray | float, float]]:
+    def guess(self, seen: Mapping[str, np.ndarray]) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        """As far as the recorded pressure leads a wall that was settled when the recording began.
+
+        A free one would be a free volume in every window.  What a wall half and twice as slow would
+        have followed is within the deviation, and that it was not settled as long as it remembers.
+        """
         pressure_pa = seen.get(f"{self.chamber}.pressure_pa")
         if pressure_pa is None:
             return {}
-        return {"followed_pa": (float(np.median(pressure_pa)) - 1e5, 1e5)}
+        gauge_pa = pressure_pa - STANDARD_ATMOSPHERE_PA
+        step_s = float(np.diff(seen["time_s"][:2]).sum())
+        followed, *others = (
+            _followed(gauge_pa, step_s, share * self.creep_time_s) for share in (1.0, 0.5, 2.0)
+        )
+        unsettled = np.exp(-np.arange(len(gauge_pa)) * step_s / self.creep_time_s)
+        apart = np.max(np.abs(np.array(others) - followed), axis=0)
+        return {"followed_pa": (followed, GUESSED_PA + apart + UNSETTLED_PA * unsettled)}
 
     def alter(self, signal: str, value: Expression, now: Conditions) -> Expression:
         if signal == f"{self.chamber}.volume_m3":
@@ -74,3 +90,11 @@ class BellowsCreep(Effect):
     def _rate(self, now: Conditions) -> Expression:
         gauge_pa = now[self.chamber].pressure_pa - now["atmosphere"].pressure_pa
         return (gauge_pa - now[self.name].followed_pa) / self.creep_time_s
+
+
+def _followed(gauge_pa: np.ndarray, step_s: float, creep_time_s: float) -> np.ndarray:
+    """What a wall that begins settled has followed at every sample."""
+    from scipy.signal import lfilter
+
+    kept = np.exp(-step_s / creep_time_s)
+    return gauge_pa[0] + lfilter([0.0, 1.0 - kept], [1.0, -kept], gauge_pa - gauge_pa[0])
