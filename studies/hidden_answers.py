@@ -18,7 +18,7 @@ from workbench.diagnosis.refit import refit, refit_shaken
 from workbench.diagnosis.result import Diagnosis, Verdict
 from workbench.diagnosis.rough import rough_fit
 from workbench.diagnosis.scan import scan
-from workbench.fitting.problem import pose
+from workbench.fitting.problem import BELIEVED, pose
 from workbench.rig import Rig
 
 MOST_DIFFERENCES = 3
@@ -97,7 +97,7 @@ def own_drop(said: Answer, rig: Rig, recorded: Recorded) -> float:
     """
     train, held_out = recorded
     base, name = said.diagnosis.base, bench_of(said.case).public_name(said.case)
-    problem = pose(rig, [train], [held_out]).with_base(base)
+    problem = pose(rig, [train], [held_out], believed=BELIEVED).with_base(base)
     candidates = [c for c in problem.whole.candidates.values() if c.name == name]
     profiles = scan(
         problem.whole, base.windows, base.unknowns, base.point, candidates, base.derivatives

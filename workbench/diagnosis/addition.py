@@ -27,7 +27,7 @@ from workbench.fitting.posterior import (
     moved_parameters,
     posterior_deviation,
 )
-from workbench.fitting.problem import Problem, pose
+from workbench.fitting.problem import BELIEVED, Problem, pose
 from workbench.law_range import ranges_text
 from workbench.plant import Plant
 from workbench.recording import Recording
@@ -81,7 +81,7 @@ def add(
     require_place(rig, plant, names)
     candidates = [plant.candidates[each] for each in names]
     progress("prior fit")
-    problem = pose(rig, train, validation)
+    problem = pose(rig, train, validation, believed=BELIEVED)
     for candidate in candidates:
         _require_absent(rig, plant, problem, candidate)
     progress(f"refit with {name}")
@@ -134,7 +134,7 @@ def add_law(
     """
     train, validation, evidence = _with_held_out(rig, train, validation)
     progress("prior fit")
-    problem = pose(rig, train, validation)
+    problem = pose(rig, train, validation, believed=BELIEVED)
     progress("empirical law")
     where = locate(problem, train)
     law = empirical_law(problem, scan_catalogue(problem), where=where)

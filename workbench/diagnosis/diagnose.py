@@ -35,7 +35,7 @@ from workbench.diagnosis.where import locate
 from workbench.effect import Kind
 from workbench.fitting.errors import errors_of
 from workbench.fitting.posterior import strained
-from workbench.fitting.problem import Problem, improved_base, pose
+from workbench.fitting.problem import BELIEVED, Problem, improved_base, pose
 from workbench.fitting.windows import MOST_WINDOWS
 from workbench.recording import Recording
 from workbench.rig import Rig
@@ -75,7 +75,7 @@ def diagnose(
     warnings = tuple(map(str, doubts))
     train, validation, evidence = held_out(train, validation)
     progress("prior fit")
-    problem = pose(rig, train, validation, most_windows)
+    problem = pose(rig, train, validation, most_windows, BELIEVED)
     evidence = weighed(evidence, problem.base_validation)
     if not evidence.strong:
         warnings += (WARNINGS[evidence],)

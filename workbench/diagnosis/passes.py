@@ -28,7 +28,7 @@ from workbench.diagnosis.shifts import shifts
 from workbench.effect import Kind
 from workbench.fitting.errors import errors_of
 from workbench.fitting.gauss_newton import Fit
-from workbench.fitting.problem import Problem, improved_base, pose
+from workbench.fitting.problem import BELIEVED, Problem, improved_base, pose
 from workbench.recording import Recording
 from workbench.rig import Rig
 
@@ -176,7 +176,7 @@ class Passes:
         if key not in self.opened:
             self.progress(f"without {step.candidate.name}")
             bare = assembled(self.rig, kept.without(step))
-            problem = pose(bare, self.train, self.validation)
+            problem = pose(bare, self.train, self.validation, believed=BELIEVED)
             found = _put_back(problem, step.candidate, kept.fit)
             if better := improved_base(problem, [found.fit]):
                 problem, found = better, _put_back(better, step.candidate, kept.fit)

@@ -245,7 +245,7 @@ def plant_at(windows: Windows, unknowns: Unknowns, t: np.ndarray) -> Plant:
 
 def parameter_steps(unknowns: Unknowns, t: np.ndarray) -> np.ndarray:
     """Steps of the scaled unknowns, turned round where they would leave the bounds."""
-    room = (unknowns.upper - unknowns.prior) / unknowns.scale - t
+    room = unknowns.ends[1] - t
     return np.where(room > PARAMETER_STEP, PARAMETER_STEP, -PARAMETER_STEP)
 
 

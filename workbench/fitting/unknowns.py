@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -19,7 +19,8 @@ class Unknowns:
 
     A fit moves t = (value - prior) / scale.  ``precision`` is the prior's weight on t**2, 1 for a
     parameter with a prior and nearly 0 for an added cause.  ``held`` are values that stay as they
-    are but differ from the plant's.
+    are but differ from the plant's.  ``believed`` is how many prior deviations the others may go:
+    one number, or (n_p,).
     """
 
     names: tuple[str, ...]
@@ -29,13 +30,27 @@ class Unknowns:
     upper: np.ndarray
     precision: np.ndarray
     held: Mapping[str, float] = field(default_factory=dict)
+    believed: float | np.ndarray = np.inf
 
     def __len__(self) -> int:
         return len(self.names)
 
+    @property
+    def ends(self) -> tuple[np.ndarray, np.ndarray]:
+        """Smallest and largest scaled unknowns: the bounds, or what is believed, (n_p,) each."""
+        reach = np.where(self.precision >= 1.0, self.believed, np.inf)
+        lower, upper = ((each - self.prior) / self.scale for each in (self.lower, self.upper))
+        return np.maximum(lower, -reach), np.minimum(upper, reach)
+
+    def trusting(self, row: int) -> Unknowns:
+        """The same, one of them bounded by what it can be alone, not by what is believed of it."""
+        believed = np.array(np.broadcast_to(self.believed, len(self)), dtype=float)
+        believed[row] = np.inf
+        return replace(self, believed=believed)
+
     def values(self, t: np.ndarray) -> dict[str, float]:
         """Parameter values at scaled unknowns, kept within their bounds."""
-        raw = np.clip(self.prior + self.scale * t, self.lower, self.upper)
+        raw = np.clip(self.prior + self.scale * self.clipped(t), self.lower, self.upper)
         return {**self.held, **dict(zip(self.names, raw.tolist(), strict=True))}
 
     def scaled(self, values: Mapping[str, float]) -> np.ndarray:
@@ -46,15 +61,12 @@ class Unknowns:
 
     def pinned(self, t: np.ndarray, gradient: np.ndarray) -> np.ndarray:
         """True where an unknown sits at a bound and the cost falls beyond it, shape (n_p,)."""
-        low = t <= (self.lower - self.prior) / self.scale + 1e-9
-        high = t >= (self.upper - self.prior) / self.scale - 1e-9
-        return (low & (gradient > 0)) | (high & (gradient < 0))
+        low, high = self.ends
+        return ((t <= low + 1e-9) & (gradient > 0)) | ((t >= high - 1e-9) & (gradient < 0))
 
     def clipped(self, t: np.ndarray) -> np.ndarray:
         """Scaled unknowns within their bounds."""
-        return np.clip(
-            t, (self.lower - self.prior) / self.scale, (self.upper - self.prior) / self.scale
-        )
+        return np.clip(t, *self.ends)
 
 
 def nominal_unknowns(
@@ -62,12 +74,14 @@ def nominal_unknowns(
     deviations: Mapping[str, float] | None = None,
     fixed: Iterable[str] = (),
     added: Iterable[Candidate] = (),
+    believed: float = np.inf,
 ) -> Unknowns:
     """Every uncertain parameter of what is present, and the strengths and forms of what is added.
 
     ``deviations`` are standard deviations that override the catalogue's; ``fixed`` are never
     moved.  A strength at its null is absent, and is not moved unless its cause is in ``added`` or
-    a little of it is tolerated (``Cause.tolerated``).
+    a little of it is tolerated (``Cause.tolerated``).  ``believed`` bounds what has a prior, in
+    deviations.
     """
     values, known = plant.values, plant.parameters
     deviations, fixed = dict(deviations or {}), set(fixed)
@@ -97,7 +111,7 @@ def nominal_unknowns(
     names = tuple(row[0] for row in rows)
     prior, scale, precision = (np.array([row[k] for row in rows]) for k in (1, 2, 3))
     lower, upper = (np.array([bounds[n][k] for n in names]) for k in (0, 1))
-    return Unknowns(names, prior, scale, lower, upper, precision)
+    return Unknowns(names, prior, scale, lower, upper, precision, believed=believed)
 
 
 def _size(plant: Plant, name: str) -> float:
