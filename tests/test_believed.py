@@ -1,0 +1,75 @@
+"""What is believed of a plant: how far a diagnosis lets its parameters go."""
+
+import numpy as np
+import pytest
+from test_diagnosis import bench, coulomb
+
+from studies.text_of_results import moved_text
+from workbench.diagnosis.diagnose import diagnose
+from workbench.diagnosis.refit import refit_shift
+from workbench.diagnosis.result import Kind, Verdict
+from workbench.diagnosis.shifts import shifts
+from workbench.fitting.posterior import moved_parameters
+from workbench.fitting.problem import BELIEVED, pose
+from workbench.fitting.unknowns import WIDE, Unknowns
+from workbench.rig import load_rig
+
+FRICTION = "friction.coulomb_force_n"
+TRUE_N, BELIEVED_N, DEVIATION_N = 20.0, 4.0, 1.0
+RIG = load_rig(
+    'name = "bench"\nplant = "cylinder_bench"\n[values]\n"chamber.area" = "518.7 mm^2"\n'
+    f'"friction.coulomb_force" = "{BELIEVED_N} N"\n'
+    f'[uncertainty]\n"friction.coulomb_force" = "{DEVIATION_N} N"\n'
+)
+TRAIN = bench(1, lambda v: TRUE_N / 8.0 * coulomb(v))
+HELD_OUT = bench(2, lambda v: TRUE_N / 8.0 * coulomb(v), gauge_pa=4e5)
+
+
+@pytest.fixture(scope="module")
+def believing():
+    return pose(RIG, [TRAIN], [HELD_OUT], believed=BELIEVED)
+
+
+def test_a_diagnosis_begins_within_what_is_believed_where_a_fit_goes_on(believing):
+    going_on = pose(RIG, [TRAIN], [HELD_OUT])
+    held, free = (each.base.plant.values[FRICTION] for each in (believing, going_on))
+
+    assert held == pytest.approx(BELIEVED_N + BELIEVED * DEVIATION_N)
+    assert free > held + 5.0 * DEVIATION_N
+
+
+def test_a_parameter_that_is_held_shifts_to_where_the_recording_has_it(believing):
+    (shift,) = [each for each in shifts(believing) if each.name == FRICTION]
+    found = refit_shift(believing, shift)
+
+    assert shift.leaves
+    assert shift.size.value == pytest.approx(found.size[FRICTION].value, rel=0.1)
+    assert found.size[FRICTION].value == pytest.approx(TRUE_N, rel=0.05)
+    assert shift.drop == pytest.approx(found.drop_train, abs=0.1)
+
+
+def test_a_diagnosis_names_what_it_holds():
+    found = diagnose(RIG, [TRAIN], [HELD_OUT])
+    leader = found.ranking[0]
+
+    assert found.verdict is Verdict.FOUND
+    assert (leader.candidate.name, leader.kind) == ("coulomb_friction", Kind.PARAMETER)
+    assert FRICTION in [each.name for each in found.strained]
+
+
+def test_what_is_held_is_told_with_how_far_that_is(believing):
+    (row,) = [each for each in moved_parameters(believing.base) if each.name == FRICTION]
+
+    assert np.isnan(row.deviation)
+    assert "at its bound; 5 prior deviations away" in moved_text([row])
+
+
+def test_only_what_has_a_prior_is_bounded_by_it():
+    rows = np.array([[10.0, 10.0], [1.0, 1.0], [0.0, 0.0], [100.0, 12.0]])
+    known = Unknowns(("a", "b"), *rows, np.array([1.0, 1.0]), believed=5.0)
+    added = Unknowns(("a", "b"), *rows, np.array([1.0, WIDE**-2]), believed=5.0)
+
+    assert [*zip(*known.ends, strict=True)] == [(-5.0, 5.0), (-5.0, 2.0)]
+    assert [*zip(*added.ends, strict=True)] == [(-5.0, 5.0), (-10.0, 2.0)]
+    assert [*zip(*known.trusting(0).ends, strict=True)] == [(-10.0, 90.0), (-5.0, 2.0)]
+    assert known.values(np.array([-7.0, 7.0])) == {"a": 5.0, "b": 12.0}
