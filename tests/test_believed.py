@@ -11,7 +11,7 @@ from workbench.diagnosis.result import Kind, Verdict
 from workbench.diagnosis.shifts import shifts
 from workbench.fitting.posterior import moved_parameters
 from workbench.fitting.problem import BELIEVED, pose
-from workbench.fitting.unknowns import WIDE, Unknowns
+from workbench.fitting.unknowns import WIDE, Unknowns, nominal_unknowns
 from workbench.rig import load_rig
 
 FRICTION = "friction.coulomb_force_n"
@@ -66,10 +66,26 @@ def test_what_is_held_is_told_with_how_far_that_is(believing):
 
 def test_only_what_has_a_prior_is_bounded_by_it():
     rows = np.array([[10.0, 10.0], [1.0, 1.0], [0.0, 0.0], [100.0, 12.0]])
-    known = Unknowns(("a", "b"), *rows, np.array([1.0, 1.0]), believed=5.0)
-    added = Unknowns(("a", "b"), *rows, np.array([1.0, WIDE**-2]), believed=5.0)
+    known = Unknowns(("a", "b"), *rows, np.array([1.0, 1.0]), reach=5.0)
+    added = Unknowns(("a", "b"), *rows, np.array([1.0, WIDE**-2]), reach=5.0)
 
     assert [*zip(*known.ends, strict=True)] == [(-5.0, 5.0), (-5.0, 2.0)]
     assert [*zip(*added.ends, strict=True)] == [(-5.0, 5.0), (-10.0, 2.0)]
     assert [*zip(*known.trusting(0).ends, strict=True)] == [(-10.0, 90.0), (-5.0, 2.0)]
     assert known.values(np.array([-7.0, 7.0])) == {"a": 5.0, "b": 12.0}
+
+
+def test_a_narrow_prior_of_a_fit_does_not_narrow_what_is_believed():
+    """A rig that was fitted while it lacked something is surer of its parameters than it should be."""
+    plant = RIG.plant
+    usual = plant.parameters["atmosphere.pressure_pa"].standard_deviation(
+        plant.values["atmosphere.pressure_pa"]
+    )
+    sure, unsure = (
+        nominal_unknowns(plant, {"atmosphere.pressure_pa": share * usual}, believed=BELIEVED)
+        for share in (0.1, 2.0)
+    )
+    for found, reach in (sure, BELIEVED * usual), (unsure, 2.0 * BELIEVED * usual):
+        row = found.names.index("atmosphere.pressure_pa")
+        below, above = (float(each[row]) * found.scale[row] for each in found.ends)
+        assert (below, above) == (pytest.approx(-reach), pytest.approx(reach))

@@ -4,7 +4,7 @@ The prior fit would swallow them.  With V the posterior variance of the scaled p
 (prior included) and t its shift in prior deviations, the recording alone would put it at
 m = t / (1 - V) with a precision L = 1/V - 1.  The cost L (m - t)^2 + t^2 that it has at the fit is
 t^2 / (1 - V), its price included, and freeing it takes all of that away.  Where only what is
-believed of it holds it at t (``Unknowns.believed``) and it would go on to t*, m = t* / (1 - V).  It
+believed of it holds it at t (``Unknowns.reach``) and it would go on to t*, m = t* / (1 - V).  It
 is named only when it leaves its prior by more than three standard deviations (diagnosis.md 1.4),
 and judged by a refit in which its prior is taken away.
 """

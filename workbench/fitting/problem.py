@@ -48,6 +48,8 @@ class Problem:
         The prior fit on the training windows.
     base_validation
         The base plant on the held-out windows, only start states refitted; None without any.
+    believed
+        How many prior deviations a parameter may go; see :data:`BELIEVED`.
     """
 
     rig: Rig
@@ -55,12 +57,12 @@ class Problem:
     added: tuple[Candidate, ...]
     base: Fit
     base_validation: Fit | None
+    believed: float = inf
 
     def unknowns(self, plant: Plant, *more: Candidate) -> Unknowns:
         """What a fit of a plant may move, with more causes added."""
         added = (*self.added, *more)
-        believed = self.base.unknowns.believed
-        return nominal_unknowns(plant, self.rig.deviations, self.rig.fixed, added, believed)
+        return nominal_unknowns(plant, self.rig.deviations, self.rig.fixed, added, self.believed)
 
     def validated(self, fit: Fit) -> Fit | None:
         """A fitted plant on the held-out windows, only start states refitted."""
@@ -191,13 +193,13 @@ def pose(
         most = max(len(windows) // 2, LEAST_HELD_OUT_WINDOWS)
         cut_s = windows.length * train[0].sample_time_s
         held_out = held_out_fit(cut_windows(plant, validation, noise, cut_s, most), base)
-    return Problem(rig, whole, added, base, held_out)
+    return Problem(rig, whole, added, base, held_out, believed)
 
 
 def posed(rig: Rig, train: Sequence[Recording], base: Fit, base_validation: Fit | None) -> Problem:
     """A problem whose fits are there already, those of a diagnosis of the rig."""
     whole = rig.fit_for(train[0])
-    return Problem(rig, whole, rig.added_to(whole), base, base_validation)
+    return Problem(rig, whole, rig.added_to(whole), base, base_validation, BELIEVED)
 
 
 def fitted_twice(windows: Windows, unknowns: Unknowns, t: np.ndarray) -> Fit:

@@ -19,8 +19,8 @@ class Unknowns:
 
     A fit moves t = (value - prior) / scale.  ``precision`` is the prior's weight on t**2, 1 for a
     parameter with a prior and nearly 0 for an added cause.  ``held`` are values that stay as they
-    are but differ from the plant's.  ``believed`` is how many prior deviations the others may go:
-    one number, or (n_p,).
+    are but differ from the plant's.  ``reach`` is how many prior deviations the others may go: one
+    number, or (n_p,).
     """
 
     names: tuple[str, ...]
@@ -30,23 +30,23 @@ class Unknowns:
     upper: np.ndarray
     precision: np.ndarray
     held: Mapping[str, float] = field(default_factory=dict)
-    believed: float | np.ndarray = np.inf
+    reach: float | np.ndarray = np.inf
 
     def __len__(self) -> int:
         return len(self.names)
 
     @property
     def ends(self) -> tuple[np.ndarray, np.ndarray]:
-        """Smallest and largest scaled unknowns: the bounds, or what is believed, (n_p,) each."""
-        reach = np.where(self.precision >= 1.0, self.believed, np.inf)
+        """Smallest and largest scaled unknowns: bounds, or ends of the reach, (n_p,) each."""
+        reach = np.where(self.precision >= 1.0, self.reach, np.inf)
         lower, upper = ((each - self.prior) / self.scale for each in (self.lower, self.upper))
         return np.maximum(lower, -reach), np.minimum(upper, reach)
 
     def trusting(self, row: int) -> Unknowns:
         """The same, one of them bounded by what it can be alone, not by what is believed of it."""
-        believed = np.array(np.broadcast_to(self.believed, len(self)), dtype=float)
-        believed[row] = np.inf
-        return replace(self, believed=believed)
+        reach = np.array(np.broadcast_to(self.reach, len(self)), dtype=float)
+        reach[row] = np.inf
+        return replace(self, reach=reach)
 
     def values(self, t: np.ndarray) -> dict[str, float]:
         """Parameter values at scaled unknowns, kept within their bounds."""
@@ -80,8 +80,9 @@ def nominal_unknowns(
 
     ``deviations`` are standard deviations that override the catalogue's; ``fixed`` are never
     moved.  A strength at its null is absent, and is not moved unless its cause is in ``added`` or
-    a little of it is tolerated (``Cause.tolerated``).  ``believed`` bounds what has a prior, in
-    deviations.
+    a little of it is tolerated (``Cause.tolerated``).  What has a prior goes no further from it
+    than ``believed`` of its deviations, or of the catalogue's where these are wider: a fit of a
+    plant that lacks something is surer of its parameters than it should be.
     """
     values, known = plant.values, plant.parameters
     deviations, fixed = dict(deviations or {}), set(fixed)
@@ -111,7 +112,9 @@ def nominal_unknowns(
     names = tuple(row[0] for row in rows)
     prior, scale, precision = (np.array([row[k] for row in rows]) for k in (1, 2, 3))
     lower, upper = (np.array([bounds[n][k] for n in names]) for k in (0, 1))
-    return Unknowns(names, prior, scale, lower, upper, precision, believed=believed)
+    usual = np.array([known[name].standard_deviation(value) for name, value, *_ in rows])
+    reach = believed * np.maximum(usual / scale, 1.0)
+    return Unknowns(names, prior, scale, lower, upper, precision, reach=reach)
 
 
 def _size(plant: Plant, name: str) -> float:
