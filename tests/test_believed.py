@@ -76,7 +76,7 @@ def test_only_what_has_a_prior_is_bounded_by_it():
 
 
 def test_a_narrow_prior_of_a_fit_does_not_narrow_what_is_believed():
-    """A rig that was fitted while it lacked something is surer of its parameters than it should be."""
+    """A rig that was fitted while it lacked something is too sure of its parameters."""
     plant = RIG.plant
     usual = plant.parameters["atmosphere.pressure_pa"].standard_deviation(
         plant.values["atmosphere.pressure_pa"]
