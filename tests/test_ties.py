@@ -93,6 +93,30 @@ def test_a_rival_that_a_few_held_out_windows_refuse_stays_in_the_tie(problem, fo
         assert group[0] == leader.candidate
 
 
+@pytest.mark.parametrize(
+    ("needed", "rest", "leads"),
+    [(1.0, 0.92, True), (0.9, 0.92, False), (1.0, 0.80, False)],
+    ids=["all that is tolerated", "less", "and explains more"],
+)
+def test_what_needs_all_that_is_tolerated_of_another_does_not_lead_it(
+    problem, followed, sound, needed, rest, leads
+):
+    """A long tube delays the commands beyond the few milliseconds that are always there."""
+    cause = replace(sound.candidate.cause, tolerated=(1.0, 2.0))
+    other = replace(sound, candidate=replace(sound.candidate, cause=cause))
+    other = replace(other, drop_train=rest, drop_validation=rest)
+    row = sound.fit.unknowns.names.index(sound.candidate.strength)
+    ends = sound.fit.unknowns.upper.copy()
+    ends[row] = sound.size[sound.candidate.strength].value / needed
+    fit = replace(sound.fit, unknowns=replace(sound.fit.unknowns, upper=ends))
+    longer = replace(named(sound, followed, 0), fit=fit, drop_train=0.93, drop_validation=0.93)
+
+    group = tie_group(problem.base, [longer, other], {})
+
+    assert len(group) == 2
+    assert (group[0].candidate == other.candidate) is leads
+
+
 def test_what_the_held_out_recording_refuses_leads_nothing_that_it_does_not(
     problem, followed, sound
 ):
