@@ -42,6 +42,11 @@ BAD = {
         "is it a recording of another plant?",
     ),
     "text": (_cell(9, 2, "abc"), "", "run.csv:10: 'abc' in column 3 is not a number"),
+    "unclear comma": (
+        _cell(9, 2, '"1,234"'),
+        "",
+        "'1,234' in column 3 is not a number; expected decimal or thousands = \",\" in [recording]",
+    ),
     "short row": (lambda s: s.replace("\n0.1,", "\n0.1\n0.1,"), "", "this row has 1 columns"),
     "backwards": (_cell(9, 0, "0.003"), "", "runs backwards at line 10: 0.003 s after 0.007 s"),
     "standing": (_cell(9, 0, "0.007"), "", "time stands still at line 10"),

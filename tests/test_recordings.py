@@ -1,5 +1,6 @@
 """Recordings from files: every dialect gives the same channels, bad input one clear message."""
 
+import re
 from dataclasses import replace
 
 import h5py
@@ -37,6 +38,7 @@ def assert_same(recording: Recording, rows: np.ndarray) -> None:
         (",", lambda s: s.replace("\n", "\r\n")),
         (",", lambda s: "\ufeff" + s),
         (",", lambda s: s.replace("time_s", '"time_s"')),
+        (",", lambda s: re.sub(r"([-+]?\d+)\.(\d+)", r'"\1,\2"', s)),
     ],
 )
 def test_every_dialect_of_csv_gives_the_same_channels(tmp_path, separator, change):
@@ -68,6 +70,17 @@ def test_a_thousands_point_beside_a_decimal_point(tmp_path):
     )
 
     assert "1.234.000;" in "\n".join(lines)
+    assert_same(recording, rows)
+
+
+def test_commas_between_thousands_in_quotes_separate_no_cells(tmp_path):
+    rows = table(2000) * [1e3, 1, 1, 1]
+    lines = [f'"{t:,.3f}",{u:.9g},{p:.9g},{x:.9g}' for t, u, p, x in rows]
+    rig = RIG.replace('unit = "s"', 'unit = "ms"')
+
+    recording = read(tmp_path, "\n".join([",".join(NAMES), *lines]), 'thousands = ","', rig)
+
+    assert '\n"1,234.000",' in "\n".join(lines)
     assert_same(recording, rows)
 
 

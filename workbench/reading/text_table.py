@@ -10,6 +10,7 @@ import csv
 import re
 import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -21,6 +22,8 @@ from workbench.recording_format import RecordingFormat
 
 NUMBER = re.compile(r"[-+]?(?:[\d.]*\d[\d.]*(?:e[-+]?\d+)?|nan|inf)", re.IGNORECASE)
 COMMA_NUMBER = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?|[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
+DECIMAL_COMMA = re.compile(r"[-+]?0?,\d+|[-+]?\d+,(?:\d{1,2}|\d{4,})")  # never between thousands
+QUOTED = re.compile(r'"([^"\n]*)"')
 MISSING = {"", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--"}
 LOOKED_AT = 50  # lines that decide on separator and decimal sign
 BINARY = re.compile(r"[\x00-\x08\x0e-\x19\x1b-\x1f\x7f]")  # control characters of no text
@@ -101,9 +104,13 @@ def find_separator(lines: Sequence[str]) -> str:
 
 def find_decimal(lines: Sequence[str], separator: str) -> str:
     """The decimal sign of these rows: the last of point and comma in a number that has both."""
-    if separator == ",":
-        return "."
     cells = [cell for line in lines for cell in _cells(line, separator)]
+    if separator == ",":  # those in quotes
+        commas = [cell for cell in cells if "," in cell]
+        surely = any(DECIMAL_COMMA.fullmatch(c) for c in commas) and not any(
+            "." in c for c in commas
+        )
+        return "," if surely else "."
     both = [cell for cell in cells if "," in cell and "." in cell]
     if both:
         return max(",.", key=both[0].rfind)
@@ -117,6 +124,9 @@ def plain_numbers(lines: list[str], separator: str, reader: RecordingFormat) -> 
     if decimal == "." and thousands is None:
         return lines
     text = "\n".join(lines)
+    if separator in (decimal, thousands):  # in quotes alone
+        inside = replace(reader, decimal=decimal)
+        return QUOTED.sub(lambda cell: plain_numbers([cell[1]], " ", inside)[0], text).split("\n")
     if thousands and thousands == decimal:  # the last one in a number is the decimal sign
         text = re.sub(rf"(?<=\d){re.escape(thousands)}(?=\d+{re.escape(thousands)})", "", text)
     elif thousands:
@@ -202,5 +212,7 @@ def _cell_by_cell(
                 found[i, row] = float(cells[column])
             except ValueError:
                 what = f"{cells[column][:SHOWN]!r} in column {column + 1} is not a number"
-                raise InputError(Message(what, file=file, line=place)) from None
+                unclear = "," in cells[column] and separator == ","
+                expected = 'decimal or thousands = "," in [recording]' if unclear else ""
+                raise InputError(Message(what, expected=expected, file=file, line=place)) from None
     return found
