@@ -1,5 +1,7 @@
 """What is believed of a plant: how far a diagnosis lets its parameters go."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from test_diagnosis import bench, coulomb
@@ -21,6 +23,7 @@ RIG = load_rig(
     f'"friction.coulomb_force" = "{BELIEVED_N} N"\n'
     f'[uncertainty]\n"friction.coulomb_force" = "{DEVIATION_N} N"\n'
 )
+NEAR_NONE_N = 5.5  # five deviations less are half a newton: no friction at all is close by
 TRAIN = bench(1, lambda v: TRUE_N / 8.0 * coulomb(v))
 HELD_OUT = bench(2, lambda v: TRUE_N / 8.0 * coulomb(v), gauge_pa=4e5)
 
@@ -46,6 +49,21 @@ def test_a_parameter_that_is_held_shifts_to_where_the_recording_has_it(believing
     assert shift.size.value == pytest.approx(found.size[FRICTION].value, rel=0.1)
     assert found.size[FRICTION].value == pytest.approx(TRUE_N, rel=0.05)
     assert shift.drop == pytest.approx(found.drop_train, abs=0.1)
+
+
+def test_a_parameter_that_is_held_shifts_no_further_than_its_bound():
+    """Friction that drives: the recording asks for less than none."""
+    values = {**RIG.plant.values, FRICTION: NEAR_NONE_N}
+    rig = replace(RIG, plant=RIG.plant.with_values(values))
+    problem = pose(rig, [bench(1, lambda v: -coulomb(v))], believed=BELIEVED)
+    (shift,) = [each for each in shifts(problem) if each.name == FRICTION]
+    found = refit_shift(problem, shift)
+
+    assert shift.leaves
+    assert shift.size.value == found.size[FRICTION].value == 0.0
+    assert np.isnan(shift.size.deviation)
+    assert shift.drop == pytest.approx(found.drop_train, abs=0.01)
+    assert shift.drop < 0.5
 
 
 def test_a_diagnosis_names_what_it_holds():

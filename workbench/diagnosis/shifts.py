@@ -4,14 +4,16 @@ The prior fit would swallow them.  With V the posterior variance of the scaled p
 (prior included) and t its shift in prior deviations, the recording alone would put it at
 m = t / (1 - V) with a precision L = 1/V - 1.  The cost L (m - t)^2 + t^2 that it has at the fit is
 t^2 / (1 - V), its price included, and freeing it takes all of that away.  Where only what is
-believed of it holds it at t (``Unknowns.reach``) and it would go on to t*, m = t* / (1 - V).  It
-is named only when it leaves its prior by more than three standard deviations (diagnosis.md 1.4),
-and judged by a refit in which its prior is taken away.
+believed of it holds it at t (``Unknowns.reach``) and it would go on to t*, m = t* / (1 - V).  Where
+m lies beyond a bound it stops there, at b, and L (m - b)^2 of the cost is left.  It is named only
+when it leaves its prior by more than three standard deviations (diagnosis.md 1.4), and judged by a
+refit in which its prior is taken away.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import nan
 
 import numpy as np
 
@@ -27,6 +29,7 @@ LEAVES_PRIOR = 3.0
 class Shift:
     """How far the recording pulls one parameter, in prior standard deviations.
 
+    size    where it would end, within its bounds
     drop    share of the misfit that freeing it removes, to first order
     """
 
@@ -53,21 +56,35 @@ def shifts(problem: Problem) -> list[Shift]:
         if name not in unknowns.names or candidate in problem.added or candidate.cause.tolerated:
             continue
         k = unknowns.names.index(name)
-        at, own = float(base.point.t[k]), float(variance[k])
-        optimum = at
-        if normal.precision[k] == 0.0:
-            alone = normal_equations(problem.linearised, unknowns.trusting(k))
-            if alone.precision[k] == 0.0:  # pinned at a bound: freeing its prior moves nothing
-                continue
-            own = float(_variance(alone)[k])
-            optimum -= float(np.linalg.solve(alone.hessian, alone.gradient)[k])
-        free = optimum / (1.0 - own)
-        gained = (1.0 / own - 1.0) * (free - at) ** 2 + at**2
-        value = float(unknowns.prior[k] + unknowns.scale[k] * free)
-        deviation = float(unknowns.scale[k] * np.sqrt(own / (1.0 - own)))
-        size, drop = Size(value, deviation), gained / problem.misfit
-        found.append(Shift(candidate, name, size, free, drop))
+        there, held = (float(base.point.t[k]), float(variance[k])), normal.precision[k] == 0.0
+        pulled = _beyond(problem, k) if held else there
+        if pulled:
+            found.append(_freed(problem, candidate, k, *pulled))
     return sorted(found, key=lambda shift: -shift.drop)
+
+
+def _beyond(problem: Problem, k: int) -> tuple[float, float] | None:
+    """Where what is held would go, and its variance; None at a bound, where nothing moves it."""
+    alone = normal_equations(problem.linearised, problem.base.unknowns.trusting(k))
+    if alone.precision[k] == 0.0:
+        return None
+    step = -np.linalg.solve(alone.hessian, alone.gradient)[k]
+    return float(problem.base.point.t[k] + step), float(_variance(alone)[k])
+
+
+def _freed(
+    problem: Problem, candidate: Candidate, k: int, optimum: float, variance: float
+) -> Shift:
+    """What the module's equations say of one parameter."""
+    unknowns, t = problem.base.unknowns, problem.base.point.t
+    alone = optimum / (1.0 - variance)
+    moved, trusting = np.where(np.arange(len(t)) == k, alone, t), unknowns.trusting(k)
+    at, end = float(t[k]), float(trusting.clipped(moved)[k])
+    gained = (1.0 / variance - 1.0) * (end - at) * (2.0 * alone - end - at) + at**2
+    spread = float(unknowns.scale[k] * np.sqrt(variance / (1.0 - variance)))
+    name = unknowns.names[k]
+    size = Size(trusting.values(moved)[name], spread if end == alone else nan)
+    return Shift(candidate, name, size, alone, gained / problem.misfit)
 
 
 def _variance(normal: Normal) -> np.ndarray:
