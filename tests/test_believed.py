@@ -10,6 +10,7 @@ from studies.text_of_results import moved_text
 from workbench.diagnosis.diagnose import diagnose
 from workbench.diagnosis.refit import refit_shift
 from workbench.diagnosis.result import Kind, Verdict
+from workbench.diagnosis.scan import scan_catalogue
 from workbench.diagnosis.shifts import shifts
 from workbench.fitting.posterior import moved_parameters
 from workbench.fitting.problem import BELIEVED, pose
@@ -64,6 +65,16 @@ def test_a_parameter_that_is_held_shifts_no_further_than_its_bound():
     assert np.isnan(shift.size.deviation)
     assert shift.drop == pytest.approx(found.drop_train, abs=0.01)
     assert shift.drop < 0.5
+
+
+def test_priors_three_times_as_wide_hold_nothing_that_is_within_them():
+    """12 N instead of 4: eight deviations, of which the wide prior lets it go fifteen."""
+    problem = pose(RIG, [bench(1, lambda v: 1.5 * coulomb(v))], believed=BELIEVED)
+    profiles = scan_catalogue(problem)
+
+    assert problem.base.plant.values[FRICTION] == pytest.approx(9.0)
+    assert profiles[0].drop > 0.5 * problem.misfit
+    assert max(each.drop_wide for each in profiles) < 0.2 * profiles[0].drop
 
 
 def test_a_diagnosis_names_what_it_holds():

@@ -29,18 +29,6 @@ class Metric:
         """c(0): the projected cost of the model as it is."""
         return self._value(self.normal.residual, self.normal.gradient)
 
-    def loosened(self, ratio: float) -> Metric:
-        """The same with priors of the parameters ``ratio`` times as wide: Lambda / ratio^2."""
-        normal = self.normal
-        less = (1.0 - ratio**-2) * normal.precision
-        looser = replace(
-            normal,
-            hessian=normal.hessian - np.diag(less),
-            gradient=normal.gradient - less * self.at.point.t,
-            precision=normal.precision - less,
-        )
-        return replace(self, normal=looser)
-
     def rows(self, residuals: np.ndarray) -> np.ndarray:
         """Residuals (n, n_y, n_windows, L) as projected rows, shape (n, n_windows, rows)."""
         n, n_y, n_w, length = residuals.shape

@@ -28,7 +28,7 @@ import numpy as np
 
 from workbench.candidate import Candidate
 from workbench.diagnosis.blind_starts import blind_starts, freed
-from workbench.diagnosis.metric import Metric, every_second
+from workbench.diagnosis.metric import Metric, every_second, metric_at
 from workbench.effect import Parameter
 from workbench.fitting.linearised import Linearised, Point
 from workbench.fitting.problem import Problem, fuller, stateless
@@ -100,6 +100,7 @@ def scan(
     candidates apart where there are many; drops count as of all.
     """
     windows, point, metric, of_all = every_second(windows, unknowns, point, at)
+    wide = metric_at(windows, unknowns.loosened(WIDER), point, metric.at)
     blind = blind_starts(windows.plant, metric.at)
     values = unknowns.values(point.t)
     profiles = []
@@ -120,7 +121,7 @@ def scan(
             alone = zip(freer, residuals, strict=True)
             rows = np.array([replace(metric, at=at).rows(r[None])[0] for at, r in alone])
         sizes = [_typical_sizes(known[c.strength], change[c.strength]) for c, change in trials]
-        profiles += _profiles(metric, trials, sizes, rows, of_all)
+        profiles += _profiles(metric, wide, trials, sizes, rows, of_all)
     return sorted(profiles, key=lambda profile: -profile.drop)
 
 
@@ -184,6 +185,7 @@ def _typical_sizes(known: Parameter, value: float) -> float:
 
 def _profiles(
     metric: Metric,
+    wide: Metric,
     trials: list[tuple[Candidate, dict[str, float]]],
     sizes: list[float],
     rows: np.ndarray,
@@ -191,7 +193,6 @@ def _profiles(
 ) -> list[Profile]:
     found: dict[str, list[tuple[Trial, np.ndarray]]] = {}
     before, as_it_is = metric.cost, metric.normal.residual
-    wide = metric.loosened(WIDER)
     for (candidate, change), size, row in zip(trials, sizes, rows, strict=True):
         cost, step = metric.explained(row)
         shown = of_all * metric.shown(row - as_it_is)

@@ -48,6 +48,10 @@ class Unknowns:
         reach[row] = np.inf
         return replace(self, reach=reach)
 
+    def loosened(self, ratio: float) -> Unknowns:
+        """The same with priors ``ratio`` times as wide; then bounds alone hold them."""
+        return replace(self, precision=self.precision / ratio**2)
+
     def values(self, t: np.ndarray) -> dict[str, float]:
         """Parameter values at scaled unknowns, kept within their bounds."""
         raw = np.clip(self.prior + self.scale * self.clipped(t), self.lower, self.upper)
