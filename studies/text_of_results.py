@@ -100,11 +100,14 @@ def _alike(where: Where) -> list[str]:
 
 
 def strained_text(found: Diagnosis) -> list[str]:
-    """Parameters that the prior fit took far from what is known of them; no line without."""
+    """Parameters that the prior fit took far from what is known of them; no line without.
+
+    What would go on is said to be held: the value is no finding of the recordings then.
+    """
     farthest = sorted(found.strained, key=lambda row: -row.far)
     told = [
         f"{public_name(row.name)} {shown(row.before, row.name)} to {shown(row.after, row.name)} "
-        f"({number(row.far, 2)} prior deviations)"
+        f"({number(row.far, 2)} prior deviations{', held there' * row.at_bound})"
         for row in farthest[:SHOWN_STRAINED]
     ]
     more = [f"and {len(farthest) - len(told)} more"] if len(farthest) > len(told) else []

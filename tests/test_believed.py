@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from test_diagnosis import bench, coulomb
 
-from studies.text_of_results import moved_text
+from studies.text_of_results import moved_text, strained_text
 from workbench.diagnosis.diagnose import diagnose
 from workbench.diagnosis.refit import refit_shift
 from workbench.diagnosis.result import Kind, Verdict
@@ -84,6 +84,8 @@ def test_a_diagnosis_names_what_it_holds():
     assert found.verdict is Verdict.FOUND
     assert (leader.candidate.name, leader.kind) == ("coulomb_friction", Kind.PARAMETER)
     assert FRICTION in [each.name for each in found.strained]
+    (told,) = strained_text(found)
+    assert told.endswith("friction.coulomb_force 4 N to 9 N (5 prior deviations, held there)")
 
 
 def test_what_is_held_is_told_with_how_far_that_is(believing):

@@ -61,7 +61,8 @@ def diagnose(
     Without ``validation`` the last third of each recording is held out, and the verdict is at most
     a tie, with a warning; so it is where a recording stands in both, or one is doubtful (see
     :mod:`workbench.consistency`).  ``most_windows`` bounds the windows that are fitted: fewer are
-    faster.
+    faster.  What is there goes no further than what is believed of it
+    (:data:`workbench.fitting.problem.BELIEVED`); what would go on is among the ``strained``.
 
     Raises
     ------

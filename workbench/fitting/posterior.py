@@ -34,7 +34,7 @@ class Moved:
 
     @property
     def at_bound(self) -> bool:
-        """True for what the fit holds at the end of its range."""
+        """True for what the fit holds at the end of its range, or of what is believed of it."""
         return isnan(self.deviation)
 
     @property
