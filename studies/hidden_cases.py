@@ -26,7 +26,7 @@ from workbench.diagnosis.rough import rough_fit
 from workbench.diagnosis.scan import scan
 from workbench.fitting.gauss_newton import fit_windows
 from workbench.fitting.linearised import Point
-from workbench.fitting.problem import pose, staged
+from workbench.fitting.problem import BELIEVED, pose, staged
 from workbench.fitting.start_states import carried
 from workbench.recording import Recording
 
@@ -99,7 +99,7 @@ def removed_share(case: Case, train: Recording) -> float:
     where that is not enough as a diagnosis does.
     """
     bench = bench_of(case)
-    problem = pose(bench.user_rig(case), [train])
+    problem = pose(bench.user_rig(case), [train], believed=BELIEVED)
     base, candidate = problem.base, problem.whole.candidates[bench.public_name(case)]
     windows = base.windows
     if candidate.strength not in windows.plant.values:

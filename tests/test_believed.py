@@ -1,11 +1,13 @@
 """What is believed of a plant: how far a diagnosis lets its parameters go."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from test_diagnosis import bench, coulomb
 
+from studies.hidden_cases import removed_share
 from studies.text_of_results import moved_text, strained_text
 from workbench.diagnosis.diagnose import diagnose
 from workbench.diagnosis.refit import refit_shift
@@ -32,6 +34,11 @@ HELD_OUT = bench(2, lambda v: TRUE_N / 8.0 * coulomb(v), gauge_pa=4e5)
 @pytest.fixture(scope="module")
 def believing():
     return pose(RIG, [TRAIN], [HELD_OUT], believed=BELIEVED)
+
+
+@pytest.fixture(scope="module")
+def found():
+    return diagnose(RIG, [TRAIN], [HELD_OUT])
 
 
 def test_a_diagnosis_begins_within_what_is_believed_where_a_fit_goes_on(believing):
@@ -77,8 +84,7 @@ def test_priors_three_times_as_wide_hold_nothing_that_is_within_them():
     assert max(each.drop_wide for each in profiles) < 0.2 * profiles[0].drop
 
 
-def test_a_diagnosis_names_what_it_holds():
-    found = diagnose(RIG, [TRAIN], [HELD_OUT])
+def test_a_diagnosis_names_what_it_holds(found):
     leader = found.ranking[0]
 
     assert found.verdict is Verdict.FOUND
@@ -86,6 +92,17 @@ def test_a_diagnosis_names_what_it_holds():
     assert FRICTION in [each.name for each in found.strained]
     (told,) = strained_text(found)
     assert told.endswith("friction.coulomb_force 4 N to 9 N (5 prior deviations, held there)")
+
+
+def test_a_hidden_effect_is_seen_where_a_diagnosis_sees_it(found, monkeypatch):
+    """A prior fit without an end would have taken most of it away."""
+    (row,) = [each for each in found.ranking if each.candidate.name == "stiction"]
+    hiding = SimpleNamespace(user_rig=lambda case: RIG, public_name=lambda case: "stiction")
+    monkeypatch.setattr("studies.hidden_cases.bench_of", lambda case: hiding)
+    (size, *_) = row.size.values()
+
+    seen = removed_share(SimpleNamespace(size=size.value), TRAIN)
+    assert seen == pytest.approx(row.drop_train, abs=0.05)
 
 
 def test_what_is_held_is_told_with_how_far_that_is(believing):
