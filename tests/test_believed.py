@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from test_diagnosis import bench, coulomb
+from test_fitting import NOISE, sines
 
 from studies.hidden_cases import removed_share
 from studies.text_of_results import moved_text, strained_text
@@ -17,7 +18,8 @@ from workbench.diagnosis.shifts import shifts
 from workbench.fitting.posterior import moved_parameters
 from workbench.fitting.problem import BELIEVED, pose
 from workbench.fitting.unknowns import WIDE, Unknowns, nominal_unknowns
-from workbench.rig import load_rig
+from workbench.plants import servo_drive
+from workbench.rig import default_rig, load_rig
 
 FRICTION = "friction.coulomb_force_n"
 TRUE_N, BELIEVED_N, DEVIATION_N = 20.0, 4.0, 1.0
@@ -82,6 +84,28 @@ def test_priors_three_times_as_wide_hold_nothing_that_is_within_them():
     assert problem.base.plant.values[FRICTION] == pytest.approx(9.0)
     assert profiles[0].drop > 0.5 * problem.misfit
     assert max(each.drop_wide for each in profiles) < 0.2 * profiles[0].drop
+
+
+@pytest.fixture
+def drive_with():
+    """The servo drive, and what it records where one of its parameters is some deviations off."""
+    drive = servo_drive().lean()
+
+    def posed(name, deviations):
+        size = drive.parameters[name].standard_deviation(drive.values[name])
+        other = drive.with_values({name: drive.values[name] + deviations * size})
+        return pose(default_rig(drive), [sines(other, NOISE)], believed=BELIEVED)
+
+    return posed
+
+
+def test_a_fit_does_not_stop_short_of_the_end_of_what_is_believed(drive_with):
+    """Where it is cut off, the others have to go with that: else every step costs more than it."""
+    base = drive_with("valve.flow_area_m2", 7.0).base
+    (row,) = [each for each in moved_parameters(base) if each.name == "valve.flow_area_m2"]
+
+    assert row.far == pytest.approx(BELIEVED, rel=1e-9)
+    assert row.at_bound
 
 
 def test_a_diagnosis_names_what_it_holds(found):

@@ -28,6 +28,7 @@ from workbench.fitting.linearised import (
     normal_equations,
     secant,
     seen_at,
+    stopping,
 )
 from workbench.fitting.unknowns import Unknowns
 from workbench.fitting.windows import UNSEEN_PENALTY, Windows
@@ -185,9 +186,12 @@ def _rescued(windows: Windows, unknowns: Unknowns, at: Linearised, now: Cost, tr
     model, and its steps are tried again: a window that runs across a break-away has slopes that
     hold nowhere.  Where one costs several times what it did, its start states have gone astray, as
     those of an armature next to its stop do by a linear model: then every window may keep its own
-    in all of the steps.
+    in all of the steps.  And what would go beyond what is believed of it stops there, and others go
+    with that: clipped alone, it may be left short of its end, where it does not count as held.
     """
     full = tried.rows[0]
+    if stopping := _stopping_steps(at, unknowns):
+        tried = Costs((*tried.rows, *_costs_after(windows, unknowns, now, stopping).rows))
     worse = full.by_window > now.by_window
     if worse.any() and not worse.all():
         less = _damped_steps(at, unknowns, ~worse)
@@ -250,6 +254,14 @@ def _damped_steps(
         dt = np.clip(dt, -longest, longest)
         steps.append((dt, _starts_with(at, dt, 1.0 / (1.0 + damping))))
     return steps
+
+
+def _stopping_steps(at: Linearised, unknowns: Unknowns) -> list[Step]:
+    """The undamped step that ends where what is believed does; none where nothing goes beyond."""
+    if not np.isfinite(unknowns.reach).any():
+        return []
+    dt = stopping(normal_equations(at, unknowns), unknowns, at.point.t)
+    return [] if dt is None else [(dt, _starts_with(at, dt))]
 
 
 def _starts_with(at: Linearised, dt: np.ndarray, share: float = 1.0) -> np.ndarray:

@@ -20,6 +20,7 @@ from workbench.plant import Plant
 
 PARAMETER_STEP = 0.25  # of the scale of an unknown
 START_STEP = 0.25  # of the deviation of a start state
+END_REACHED = 1e-9  # of a scaled unknown
 
 
 @dataclass(frozen=True)
@@ -237,6 +238,24 @@ def normal_equations(
     flat = flat * free
     hessian = flat.T @ flat + np.diag(np.where(free, unknowns.precision, 1.0))
     return Normal(hessian, gradient * free, r, flat.reshape(J.shape), unknowns.precision * free)
+
+
+def stopping(normal: Normal, unknowns: Unknowns, t: np.ndarray) -> np.ndarray | None:
+    """The step (n_p,) to the minimum within the ends; None where none would go beyond one.
+
+    What would go beyond stops at its end, and the others follow by the quadratic model of those
+    that are left, until none goes beyond.
+    """
+    left, dt = np.ones(len(t), dtype=bool), np.zeros(len(t))
+    while left.any():
+        g = normal.gradient + normal.hessian @ np.where(left, 0.0, dt)
+        dt[left] = -np.linalg.solve(normal.hessian[np.ix_(left, left)], g[left])
+        within = unknowns.clipped(t + dt) - t
+        beyond = left & (np.abs(within - dt) > END_REACHED)
+        if not beyond.any():
+            break
+        dt, left = np.where(beyond, within, dt), left & ~beyond
+    return None if left.all() else dt
 
 
 def plant_at(windows: Windows, unknowns: Unknowns, t: np.ndarray) -> Plant:
