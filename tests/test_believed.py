@@ -108,6 +108,17 @@ def test_a_fit_does_not_stop_short_of_the_end_of_what_is_believed(drive_with):
     assert row.at_bound
 
 
+def test_a_shift_finds_its_way_from_the_end_at_which_it_was_held(drive_with):
+    """Others have bent to imitate the leak that is not allowed: every small step costs more."""
+    problem, name = drive_with("valve.leak_area_m2", 19.0), "valve.leak_area_m2"
+    (shift,) = [each for each in shifts(problem) if each.name == name]
+    found = refit_shift(problem, shift)
+
+    true = problem.rig.plant.values[name] * (1.0 + 19.0 * 0.05)
+    assert found.size[name].value == pytest.approx(true, rel=0.1)
+    assert found.drop_train > 0.9 * shift.drop > 0.5
+
+
 def test_a_diagnosis_names_what_it_holds(found):
     leader = found.ranking[0]
 
