@@ -10,6 +10,7 @@ from test_fitting import NOISE, sines
 
 from studies.hidden_cases import removed_share
 from studies.text_of_results import moved_text, strained_text
+from workbench.diagnosis.addition import accept, assembled
 from workbench.diagnosis.diagnose import diagnose
 from workbench.diagnosis.refit import refit_shift
 from workbench.diagnosis.result import Kind, Verdict
@@ -108,6 +109,17 @@ def test_a_fit_does_not_stop_short_of_the_end_of_what_is_believed(drive_with):
     assert row.at_bound
 
 
+def test_a_shift_finds_its_way_from_the_end_at_which_it_was_held(drive_with):
+    """Others have bent to imitate the leak that is not allowed: every small step costs more."""
+    problem, name = drive_with("valve.leak_area_m2", 19.0), "valve.leak_area_m2"
+    (shift,) = [each for each in shifts(problem) if each.name == name]
+    found = refit_shift(problem, shift)
+
+    true = problem.rig.plant.values[name] * (1.0 + 19.0 * 0.05)
+    assert found.size[name].value == pytest.approx(true, rel=0.1)
+    assert found.drop_train > 0.9 * shift.drop > 0.5
+
+
 def test_a_diagnosis_names_what_it_holds(found):
     leader = found.ranking[0]
 
@@ -116,6 +128,17 @@ def test_a_diagnosis_names_what_it_holds(found):
     assert FRICTION in [each.name for each in found.strained]
     (told,) = strained_text(found)
     assert told.endswith("friction.coulomb_force 4 N to 9 N (5 prior deviations, held there)")
+
+
+def test_a_shift_that_was_accepted_may_go_as_far_as_before_in_the_next_round(found):
+    """What is found later may have been part of it."""
+    rig = assembled(RIG, [accept(RIG, found)])
+    unknowns = nominal_unknowns(rig.plant, rig.deviations, rig.fixed, believed=BELIEVED)
+    row = unknowns.names.index(FRICTION)
+
+    assert unknowns.prior[row] == pytest.approx(TRUE_N, rel=0.05)
+    assert unknowns.scale[row] == pytest.approx(DEVIATION_N)
+    assert unknowns.ends[1][row] == pytest.approx(BELIEVED, rel=0.01)
 
 
 def test_a_hidden_effect_is_seen_where_a_diagnosis_sees_it(found, monkeypatch):

@@ -141,7 +141,7 @@ def asked_first_at(monkeypatch, module, problem, law):
         asked.append(problem)
         return law if len(asked) == 1 else empirical_law(problem, *known, **more)
 
-    monkeypatch.setattr(module, "pose", lambda *_: problem)
+    monkeypatch.setattr(module, "pose", lambda *_, **__: problem)
     monkeypatch.setattr(module, "empirical_law", found)
     return asked
 

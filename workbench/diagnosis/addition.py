@@ -248,7 +248,9 @@ def assembled(rig: Rig, steps: Sequence[Addition]) -> Rig:
 def freed(rig: Rig, step: Addition, own: Iterable[str] | None = None) -> Rig:
     """The rig with its own priors and one more free effect; what was added starts where it is.
 
-    ``own`` are the parameters that may be set: by default all that the fit set free.
+    A shift is known no better there than before: how sure its fit is came of the recordings that
+    are fitted again, without what is found later.  ``own`` are the parameters that may be set: by
+    default all that the fit set free.
     """
     ours, fit, unknowns = rig.plant.values, step.fit, step.fit.unknowns
     values = fit.plant.values
@@ -259,8 +261,8 @@ def freed(rig: Rig, step: Addition, own: Iterable[str] | None = None) -> Rig:
     if is_new(rig, step.candidate):
         return rig.with_added(plant, [step.candidate.name])
     known = dict(zip(unknowns.names, posterior_deviation(fit).tolist(), strict=True))
-    loosened = {**rig.deviations, **{n: known[n] for n in free if known[n] > 0.0}}
-    return replace(rig, plant=plant, deviations=loosened)
+    looser = {n: known[n] for n in free if known[n] > rig.standard_deviation(n)}
+    return replace(rig, plant=plant, deviations={**rig.deviations, **looser})
 
 
 def addition(

@@ -276,3 +276,10 @@ def beside(fit: Fit, dt: np.ndarray) -> Point:
     """The point a step (n_p,) of the scaled unknowns away, start states as the linear model has."""
     step = (dt, _starts_with(fit.derivatives, dt))
     return _after(fit.windows, fit.unknowns, fit.point, step)
+
+
+def leap(fit: Fit) -> Point:
+    """Where the linear model has its minimum within the ends, whatever it costs there."""
+    at, unknowns = fit.derivatives, fit.unknowns
+    step, *_ = _stopping_steps(at, unknowns) or _damped_steps(at, unknowns)
+    return _after(fit.windows, unknowns, fit.point, step)
