@@ -16,6 +16,7 @@ from workbench.diagnosis.refit import refit_shift
 from workbench.diagnosis.result import Kind, Verdict
 from workbench.diagnosis.scan import scan_catalogue
 from workbench.diagnosis.shifts import shifts
+from workbench.diagnosis.verdict import held
 from workbench.fitting.posterior import moved_parameters
 from workbench.fitting.problem import BELIEVED, pose
 from workbench.fitting.unknowns import WIDE, Unknowns, nominal_unknowns
@@ -118,6 +119,16 @@ def test_a_shift_finds_its_way_from_the_end_at_which_it_was_held(drive_with):
     true = problem.rig.plant.values[name] * (1.0 + 19.0 * 0.05)
     assert found.size[name].value == pytest.approx(true, rel=0.1)
     assert found.drop_train > 0.9 * shift.drop > 0.5
+
+
+def test_what_no_cause_can_name_is_told_where_it_is_held(drive_with, believing, found):
+    """A valve's flow area is no cause of the catalogue: whatever is named may stand for it."""
+    name = "valve.flow_area_m2"
+    (told,) = held(drive_with(name, 7.0).base)
+
+    assert told.startswith("valve.flow_area would go further than 5 deviations")
+    assert held(believing.base) and held(drive_with(name, 1.0).base) == ()
+    assert not [each for each in found.warnings if "would go further" in each]
 
 
 def test_a_diagnosis_names_what_it_holds(found):

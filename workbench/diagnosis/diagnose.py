@@ -30,7 +30,14 @@ from workbench.diagnosis.ranking import ranked
 from workbench.diagnosis.result import NAMING, Diagnosis, Evidence, Law, Ranked, Where
 from workbench.diagnosis.scan import Profile
 from workbench.diagnosis.settle import with_settled_sizes
-from workbench.diagnosis.verdict import far_above_noise, judged, sentence, unexplained, unsteady
+from workbench.diagnosis.verdict import (
+    far_above_noise,
+    held,
+    judged,
+    sentence,
+    unexplained,
+    unsteady,
+)
 from workbench.diagnosis.where import locate
 from workbench.effect import Kind
 from workbench.fitting.errors import errors_of
@@ -177,6 +184,7 @@ def _concluded(
         told = f"the refit with {best.candidate.name} did not converge: its size may be off"
         warnings = (told, *warnings)
     after = (law.fit, law.validation) if law else (best and best.fit, best and best.validation)
+    warnings += held(after[0] or problem.base)
     return Diagnosis(
         rig_name=rig_name,
         verdict=verdict,

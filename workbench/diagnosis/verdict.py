@@ -10,10 +10,14 @@ from workbench.diagnosis.result import NAMING, Evidence, Law, Ranked, Verdict, t
 from workbench.diagnosis.scan import WIDER, Profile
 from workbench.fitting.errors import errors_of
 from workbench.fitting.gauss_newton import Fit
+from workbench.fitting.posterior import held_back
+from workbench.fitting.problem import BELIEVED
+from workbench.units import public_name
 
 FAR_ABOVE_NOISE = 3.0  # RMSE over noise that is worth a word where nothing is named
 UNEXPLAINED = "unexplained errors remain on held-out windows"
 BLIND_SHOWN = 4  # names of what a recording cannot show
+HELD_SHOWN = 3  # names of what is held
 
 
 def judged(
@@ -86,6 +90,19 @@ def unexplained(far: Sequence[str], verdict: Verdict, ranking: Sequence[Ranked])
     if verdict is Verdict.RECORDING_TOO_WEAK or not any(row.blind for row in ranking):
         return (told,)
     return (f"{told}; {_blind(ranking)}",)
+
+
+def held(last: Fit) -> tuple[str, ...]:
+    """A warning where the last model would go beyond what the rig believes of its parameters.
+
+    What is named then may stand for what these are not allowed.
+    """
+    names = [public_name(row.name) for row in held_back(last)]
+    if not names:
+        return ()
+    more = f" and {len(names) - HELD_SHOWN} more" if len(names) > HELD_SHOWN else ""
+    beyond = f"would go further than {BELIEVED:g} deviations from what the rig believes"
+    return (f"{', '.join(names[:HELD_SHOWN])}{more} {beyond}: `workbench fit` lets them",)
 
 
 def sentence(

@@ -99,6 +99,13 @@ def strained(fit: Fit) -> tuple[Moved, ...]:
     return tuple(each for each in moved_parameters(fit) if each.far > FAR_MOVED)
 
 
+def held_back(fit: Fit) -> tuple[Moved, ...]:
+    """What would go further, were it not for what is believed of it."""
+    unknowns = fit.unknowns
+    ends = zip(moved_parameters(fit), unknowns.lower, unknowns.upper, strict=True)
+    return tuple(row for row, low, high in ends if row.at_bound and low < row.after < high)
+
+
 def moved_parameters(fit: Fit) -> tuple[Moved, ...]:
     """What a fit moved, with standard deviations."""
     values, unknowns = fit.plant.values, fit.unknowns
