@@ -156,9 +156,9 @@ def tie_group(base: Fit, refits: list[Refit], profiles: dict[str, Profile]) -> l
     effects before parameters that would lie far off what is known of them, and among these the one
     leads that removes most as the mean over training and held-out recordings: either alone orders
     rivals by what its few events happen to show.  But where one leaves at least a fifth less of
-    the held-out misfit, that recording decides.  And where the leader needs as much of another as
-    is tolerated and leaves hardly less than that one, the other leads.  Those that look most like
-    the leader stand next to it: were it wrong, it would stand for one of them.
+    the held-out misfit, that recording decides.  And where the leader needs more than is usual of
+    one that is always there and leaves hardly less than that one, the other leads.  Those that look
+    most like the leader stand next to it: were it wrong, it would stand for one of them.
     """
     best = refits[0]
     tied = [best]
@@ -199,19 +199,18 @@ def _refused_by_few(other: Refit, best: Refit) -> bool:
 
 
 def _leans_on(leader: Refit, other: Refit) -> bool:
-    """True where a leader takes all that is tolerated of another and leaves hardly less than it.
+    """True where a leader needs more of another than is usual, and leaves hardly less than it.
 
-    A command delay of three milliseconds is in every fit: a tube that makes the commands later than
-    that is one more cause for what a longer delay explains alone.
+    A command delay of two milliseconds is in every fit: a tube that needs more than that, and makes
+    the commands later still, is one more cause for what a longer delay explains alone.
     """
     name, unknowns = other.candidate.strength, leader.fit.unknowns
     if other is leader or not other.candidate.cause.tolerated or name not in unknowns.names:
         return False
-    row = unknowns.names.index(name)
-    at_end = leader.fit.point.t[row] >= unknowns.ends[1][row] - AT_BOUND
+    usual = leader.fit.point.t[unknowns.names.index(name)] < 1.0
     sides = ((1.0 - share_removed(each), left_held_out(each)) for each in (leader, other))
     ours, theirs = ([max(left, LITTLE_LEFT) for left in each] for each in sides)
-    return bool(at_end) and not any(map(clearly_less, ours, theirs))
+    return not usual and not any(map(clearly_less, ours, theirs))
 
 
 def clearly_less(left: float, than: float) -> bool:
