@@ -18,7 +18,7 @@ from workbench.diagnosis.refit import refit, refit_shaken
 from workbench.diagnosis.result import Diagnosis, Verdict
 from workbench.diagnosis.rough import rough_fit
 from workbench.diagnosis.scan import scan
-from workbench.fitting.problem import BELIEVED, pose
+from workbench.fitting.problem import posed
 from workbench.rig import Rig
 
 MOST_DIFFERENCES = 3
@@ -95,9 +95,9 @@ def own_drop(said: Answer, rig: Rig, recorded: Recorded) -> float:
     What no recording shows is not refitted, but neither is what stands behind many that do the
     same: only its own refit tells whether it can be seen.
     """
-    train, held_out = recorded
+    train, _ = recorded
     base, name = said.diagnosis.base, bench_of(said.case).public_name(said.case)
-    problem = pose(rig, [train], [held_out], believed=BELIEVED).with_base(base)
+    problem = posed(rig, [train], base, said.diagnosis.base_validation)
     candidates = [c for c in problem.whole.candidates.values() if c.name == name]
     profiles = scan(
         problem.whole, base.windows, base.unknowns, base.point, candidates, base.derivatives

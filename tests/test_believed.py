@@ -47,10 +47,10 @@ def found():
 
 def test_a_diagnosis_begins_within_what_is_believed_where_a_fit_goes_on(believing):
     going_on = pose(RIG, [TRAIN], [HELD_OUT])
-    held, free = (each.base.plant.values[FRICTION] for each in (believing, going_on))
+    ended, free = (each.base.plant.values[FRICTION] for each in (believing, going_on))
 
-    assert held == pytest.approx(BELIEVED_N + BELIEVED * DEVIATION_N)
-    assert free > held + 5.0 * DEVIATION_N
+    assert ended == pytest.approx(BELIEVED_N + BELIEVED * DEVIATION_N)
+    assert free > ended + 5.0 * DEVIATION_N
 
 
 def test_a_parameter_that_is_held_shifts_to_where_the_recording_has_it(believing):

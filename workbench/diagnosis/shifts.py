@@ -56,8 +56,8 @@ def shifts(problem: Problem) -> list[Shift]:
         if name not in unknowns.names or candidate in problem.added or candidate.cause.tolerated:
             continue
         k = unknowns.names.index(name)
-        there, held = (float(base.point.t[k]), float(variance[k])), normal.precision[k] == 0.0
-        pulled = _beyond(problem, k) if held else there
+        held = normal.precision[k] == 0.0
+        pulled = _beyond(problem, k) if held else (float(base.point.t[k]), float(variance[k]))
         if pulled:
             found.append(_freed(problem, candidate, k, *pulled))
     return sorted(found, key=lambda shift: -shift.drop)

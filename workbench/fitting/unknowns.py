@@ -19,8 +19,8 @@ class Unknowns:
 
     A fit moves t = (value - prior) / scale.  ``precision`` is the prior's weight on t**2, 1 for a
     parameter with a prior and nearly 0 for an added cause.  ``held`` are values that stay as they
-    are but differ from the plant's.  ``reach`` is how many prior deviations the others may go: one
-    number, or (n_p,).
+    are but differ from the plant's.  ``reach`` is how many prior deviations what has a prior may
+    go: one number, or (n_p,).
     """
 
     names: tuple[str, ...]
