@@ -74,7 +74,9 @@ RIGID = (
     LeftOut("finger", "one body with the main piston", "a joint of 5e6 N/m is no part of a design"),
     LeftOut("control_chamber.pressure_pa", "ambient pressure", "its port is wide"),
 )
-GAS = LeftOut("mass of gas", "gas at supply temperature", "temperature moves the flow by per cents")
+GAS = LeftOut(
+    "mass of gas", "gas at supply temperature", "temperature moves a braking pressure by per cents"
+)
 SWITCHED = LeftOut("solenoids", "armature at the end its command drives it to", "over in 4 to 7 ms")
 REPLACED = LeftOut("solenoids", "their mass flows as commands", "the input of the paper")
 

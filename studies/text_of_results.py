@@ -236,9 +236,10 @@ def moved_text(rows: Sequence[Moved]) -> str:
 
 
 def _oddities(row: Moved) -> list[str]:
-    """Where a parameter ended at a bound, or far from where it was believed to be."""
+    """Where a parameter ended at a bound or was held, or far from where it was believed to be."""
     far = f"{number(row.far, 2)} prior deviations away"
-    return ["at its bound"] * row.at_bound + [far] * (row.far > FAR_MOVED)
+    stopped = "held by what is believed of it" if row.held else "at its bound"
+    return [stopped] * row.at_bound + [far] * (row.far > FAR_MOVED)
 
 
 def fit_text(found: FitReport, unit_of: Mapping[str, str]) -> str:

@@ -107,7 +107,7 @@ def test_a_fit_does_not_stop_short_of_the_end_of_what_is_believed(drive_with):
     (row,) = [each for each in moved_parameters(base) if each.name == "valve.flow_area_m2"]
 
     assert row.far == pytest.approx(BELIEVED, rel=1e-9)
-    assert row.at_bound
+    assert row.at_bound and row.held
 
 
 def test_a_shift_finds_its_way_from_the_end_at_which_it_was_held(drive_with):
@@ -167,7 +167,7 @@ def test_what_is_held_is_told_with_how_far_that_is(believing):
     (row,) = [each for each in moved_parameters(believing.base) if each.name == FRICTION]
 
     assert np.isnan(row.deviation)
-    assert "at its bound; 5 prior deviations away" in moved_text([row])
+    assert "held by what is believed of it; 5 prior deviations away" in moved_text([row])
 
 
 def test_only_what_has_a_prior_is_bounded_by_it():

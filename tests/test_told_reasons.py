@@ -8,7 +8,7 @@ from test_report import LAG, LEAK, UNITS, diagnosis, ranked
 
 from studies.documents import diagnosis_document
 from studies.text_of_ranking import reasons
-from studies.text_of_results import diagnosis_text
+from studies.text_of_results import diagnosis_text, moved_text
 from workbench.diagnosis.judge import HELD_OUT_REASON, SHARE_REASON
 from workbench.diagnosis.result import Verdict
 from workbench.diagnosis.verdict import BLIND_SHOWN, unexplained
@@ -56,6 +56,15 @@ def test_what_the_prior_fit_strains_is_told():
     (told,) = diagnosis_document(found, UNITS)["strained"]
     assert (told["name"], told["unit"]) == ("command_delay.delay", "s")
     assert told["prior_deviations_moved"] == pytest.approx(3.0)
+
+
+def test_what_is_held_by_belief_is_not_told_to_be_at_the_end_of_its_range():
+    ended = Moved("rod.mass_kg", 2.0, 2.5, float("nan"), 0.1)
+
+    assert "at its bound; 5 prior deviations away" in moved_text([ended])
+    held = moved_text([replace(ended, held=True)])
+    assert "held by what is believed of it; 5 prior deviations away" in held
+    assert "bound" not in held
 
 
 def test_the_farthest_of_the_strained_come_first_and_the_rest_is_counted():

@@ -23,7 +23,8 @@ class Moved:
     """One parameter before and after: values, posterior and prior standard deviations in SI.
 
     What was added has no prior: its ``prior_deviation`` is infinite.  What ended at a bound has no
-    ``deviation``, NaN.
+    ``deviation``, NaN.  It is ``held`` where that is the end of what is believed of it alone, and
+    not of its range.
     """
 
     name: str
@@ -31,6 +32,7 @@ class Moved:
     after: float
     deviation: float
     prior_deviation: float
+    held: bool = False
 
     @property
     def at_bound(self) -> bool:
@@ -101,23 +103,16 @@ def strained(fit: Fit) -> tuple[Moved, ...]:
 
 def held_back(fit: Fit) -> tuple[Moved, ...]:
     """What would go further, were it not for what is believed of it."""
-    unknowns = fit.unknowns
-    ends = zip(moved_parameters(fit), unknowns.lower, unknowns.upper, strict=True)
-    return tuple(row for row, low, high in ends if row.at_bound and low < row.after < high)
+    return tuple(row for row in moved_parameters(fit) if row.held)
 
 
 def moved_parameters(fit: Fit) -> tuple[Moved, ...]:
     """What a fit moved, with standard deviations."""
-    values, unknowns = fit.plant.values, fit.unknowns
-    deviation = posterior_deviation(fit)
-    return tuple(
-        Moved(name, float(prior), values[name], float(d), float(s) if w >= 1.0 else inf)
-        for name, prior, s, w, d in zip(
-            unknowns.names,
-            unknowns.prior,
-            unknowns.scale,
-            unknowns.precision,
-            deviation,
-            strict=True,
-        )
-    )
+    unknowns, deviations = fit.unknowns, posterior_deviation(fit)
+    found = []
+    for k, name in enumerate(unknowns.names):
+        after, deviation = fit.plant.values[name], float(deviations[k])
+        prior_deviation = float(unknowns.scale[k]) if unknowns.precision[k] >= 1.0 else inf
+        held = isnan(deviation) and bool(unknowns.lower[k] < after < unknowns.upper[k])
+        found.append(Moved(name, float(unknowns.prior[k]), after, deviation, prior_deviation, held))
+    return tuple(found)
