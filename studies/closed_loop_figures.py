@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from linearize.standard import POSITION
 from studies.closed_loop_check import Check
-from studies.figures.style import PAGE_IN, kind_of_line, new_figure
+from studies.figures.style import PAGE_IN, kind_of_line, literal, new_figure
 from studies.scenarios import LATE_S
 from studies.text import number
 
@@ -65,10 +65,11 @@ def draw_command(axes: Axes, records: dict[str, LoopRecord]) -> None:
 
 
 def by_scenario(check: Check | FollowingCheck) -> dict[str, dict[str, LoopRecord]]:
-    """Records of each scenario, by design and estimator."""
+    """Records of each scenario, by design and estimator as a legend takes them."""
     found: dict[str, dict[str, LoopRecord]] = {}
     for row, record in zip(check.rows, check.records, strict=True):
-        found.setdefault(row.scenario, {})[f"{row.design}, {row.estimator}"] = record
+        name = literal(f"{row.design}, {row.estimator}")
+        found.setdefault(row.scenario, {})[name] = record
     return found
 
 

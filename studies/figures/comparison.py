@@ -9,7 +9,17 @@ import numpy as np
 
 from studies.figures.error_maps import map_figure
 from studies.figures.residuals import residual_figure
-from studies.figures.style import BLUE, GREY, ORANGE, PAGE_IN, RED, new_figure, styled, thinned
+from studies.figures.style import (
+    BLUE,
+    GREY,
+    ORANGE,
+    PAGE_IN,
+    RED,
+    headline,
+    new_figure,
+    styled,
+    thinned,
+)
 from studies.text import labelled
 from studies.text_of_comparison import shown_regimes
 from workbench.comparison.compare import FREE_RUN, ONE_STEP, PLAIN, WINDOW
@@ -24,6 +34,7 @@ if TYPE_CHECKING:
 LINES = {ONE_STEP: ("-.", ORANGE), WINDOW: ("-", BLUE), FREE_RUN: ("--", RED), PLAIN: ("-", BLUE)}
 OVERLAID = (FREE_RUN, WINDOW, PLAIN)
 IN_A_COLUMN = 4  # outputs
+BARS_IN = 3.3  # across the bars of the regimes, beside their names
 
 
 def comparison_figures(found: Comparison, prefix: str = "") -> dict[str, Figure]:
@@ -67,9 +78,8 @@ def overlay_figure(each: RecordingComparison) -> Figure:
             if k + across >= len(names):
                 lower.set_xlabel("time (s)")
                 lower.tick_params(labelbottom=True)
-        figure.suptitle(
-            f"{each.name}: measured, simulated and error, worst windows shaded", fontsize=8
-        )
+        title = f"{each.name}: measured, simulated and error, worst windows shaded"
+        figure.suptitle(headline(title, PAGE_IN), fontsize=8)
         handles, labels = panels[0, 0].get_legend_handles_labels()
         more, words = panels[1, 0].get_legend_handles_labels()
         columns = len(handles) + len(more)
@@ -132,6 +142,8 @@ def regime_figure(each: RecordingComparison) -> Figure:
         axes.invert_yaxis()
         axes.grid(False, axis="y")
         axes.set_xlabel("share (%)")
-        axes.set_title(f"{each.name}: where the error is, {each.judged}; regimes overlap")
+        title = f"{each.name}: where the error is, {each.judged}; regimes overlap"
+        axes.set_title(headline(title, BARS_IN))
+        axes.set_label(title)  # in the table
         axes.legend()
     return figure

@@ -38,9 +38,8 @@ def write_drawn(figure: Figure, path: Path) -> None:
             found = [*_curves(axes)]
             named = curve_names(axes, found)
             for curve, (_, x, y) in zip(named, found, strict=True):
-                writer.writerows(
-                    (panel, curve, _short(a), _short(b)) for a, b in zip(x, y, strict=True)
-                )
+                names = _as_named(panel), _as_named(curve)
+                writer.writerows((*names, _short(a), _short(b)) for a, b in zip(x, y, strict=True))
 
 
 def panel_names(figure: Figure) -> list[str]:
@@ -214,6 +213,11 @@ def _words(axis: Axis) -> dict[float, str]:
     ticks = axis.get_ticklocs()
     labels = axis.get_major_formatter().format_ticks(ticks)
     return {round(float(at), 6): label for at, label in zip(ticks, labels, strict=True)}
+
+
+def _as_named(words: str) -> str:
+    """Words of a figure without what keeps a dollar from beginning a formula."""
+    return words.replace(r"\$", "$")
 
 
 def _short(value: object) -> str:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from studies.figures.style import BLUE, GREY, PAGE_IN, RED, new_figure, styled
+from studies.figures.style import BLUE, GREY, PAGE_IN, RED, headline, new_figure, styled
 from studies.text import outside_band
 from workbench.comparison.compare import ONE_STEP, PLAIN
 from workbench.units import display_scale, display_unit, public_name
@@ -32,7 +32,7 @@ def residual_figure(each: RecordingComparison) -> Figure:
         panels[-1, 1].set_xlabel("lag (s)")
         panels[0, 0].set_title("spectral density")
         panels[0, 1].set_title("autocorrelation; 95 % of white noise within the band")
-        figure.suptitle(f"{each.name}: error, {horizon}", fontsize=8)
+        figure.suptitle(headline(f"{each.name}: error, {horizon}", PAGE_IN), fontsize=8)
         pairs = [axes.get_legend_handles_labels() for axes in panels[0]]
         (lines, words), (more, others) = pairs
         figure.legend(lines + more, words + others, loc="outside lower center", ncols=4)
