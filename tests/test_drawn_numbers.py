@@ -136,3 +136,24 @@ def test_points_with_error_bars_are_named_by_their_label(tmp_path):
     ((_, found),) = table(figure, tmp_path).items()
     assert [*found] == ["exhaust path", "supply path", "rig"]
     assert found["supply path"] == [("4", "0"), ("6", "3")]
+
+
+def test_the_ends_of_error_bars_stand_beside_their_points_and_nowhere_else(tmp_path):
+    with styled():
+        figure = new_figure(3.5, 2.0)
+        left, right = figure.subplots(1, 2)
+        left.plot([0.0, 9.0], [1.0, 2.0], label="fitted")
+        left.errorbar([4.0, 6.0], [1.0, 3.0], [0.1, np.nan], fmt="s", label="runs")
+        left.set_ylabel("force (N)")
+        right.plot([5.0], [7.0], label="rest")
+        right.set_ylabel("place (mm)")
+    save(figure, tmp_path / "one", "x")
+
+    assert (tmp_path / "one.csv").read_text().splitlines() == [
+        "panel,curve,x,y,low,high",
+        "force (N),fitted,0,1,,",
+        "force (N),fitted,9,2,,",
+        "force (N),runs,4,1,0.9,1.1",
+        "force (N),runs,6,3,nan,nan",
+        "place (mm),rest,5,7,,",
+    ]
