@@ -1,6 +1,7 @@
 """The table beside a figure tells every panel and every curve apart."""
 
 import csv
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -80,6 +81,21 @@ def test_panels_of_residuals_are_those_of_their_output(tmp_path):
         "spectral density",
         "autocorrelation",
     ] * 2
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_what_is_said_of_a_correlation_covers_none_of_it(sign):
+    """As of slow errors, whose correlation is near one all along."""
+    (one,) = decay().recordings
+    (name, residual) = next(iter(one.residuals.items()))
+    high = replace(residual, correlation=sign * np.ones_like(residual.lag_s))
+    figure = residual_figure(replace(one, residuals={name: high}))
+    figure.draw_without_rendering()
+
+    axes = figure.axes[1]
+    (line,), (said,) = axes.lines, axes.texts
+    heights = axes.transData.transform(np.column_stack(line.get_data()))[:, 1]
+    assert said.get_window_extent().y0 > heights.max()
 
 
 def test_a_spread_is_named_by_its_line_and_so_are_its_curves(tmp_path):

@@ -131,7 +131,7 @@ def regime_figure(each: RecordingComparison) -> Figure:
     """Share of the error beside the share of the time, by regime; regimes overlap."""
     shown = shown_regimes(each.by_regime)
     with styled():
-        figure = new_figure(PAGE_IN / 1.5, 0.8 + 0.26 * len(shown))
+        figure = new_figure(PAGE_IN / 1.5, 1.0 + 0.26 * len(shown))
         axes = figure.subplots()
         rows = np.arange(len(shown))
         error = [100.0 * regime.share_of_error for regime in shown]
@@ -145,5 +145,5 @@ def regime_figure(each: RecordingComparison) -> Figure:
         title = f"{each.name}: where the error is, {each.judged}; regimes overlap"
         axes.set_title(headline(title, BARS_IN))
         axes.set_label(title)  # in the table
-        axes.legend()
+        figure.legend(loc="outside lower center", ncols=2)  # all bars may be long
     return figure

@@ -11,6 +11,8 @@ from studies.text import outside_band
 from workbench.comparison.compare import ONE_STEP, PLAIN
 from workbench.units import display_scale, display_unit, public_name
 
+ROOM = 1.4  # of a correlation above zero, for what is said of it
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -57,7 +59,7 @@ def _draw_correlation(axes: Axes, name: str, residual: Residual) -> None:
     axes.fill_between(lags, -bands, bands, color=GREY, alpha=0.5, linewidth=0, label="band")
     axes.plot(lags, values, "o-", color=BLUE, markersize=1.5, linewidth=0.5, label="correlation")
     most = 1.15 * max(np.max(np.abs(values), initial=0.0), np.max(2.0 * bands, initial=0.0))
-    axes.set_ylim(-(most or 1.0), most or 1.0)
+    axes.set_ylim(-(most or 1.0), ROOM * (most or 1.0))
     axes.set_ylabel("correlation (-)")
     axes.annotate(
         outside_band(residual.outside),
