@@ -13,7 +13,7 @@ from studies.figures.residuals import residual_figure
 from studies.figures.robustness import influence_figure, spread_figure
 from studies.figures.style import new_figure, save, styled
 from studies.robustness import Line, Robustness
-from workbench.comparison.compare import compare
+from workbench.comparison.compare import FREE_RUN, PLAIN, compare
 from workbench.recording import Recording
 from workbench.rig import default_rig
 
@@ -81,6 +81,17 @@ def test_panels_of_residuals_are_those_of_their_output(tmp_path):
         "spectral density",
         "autocorrelation",
     ] * 2
+
+
+def test_a_plant_without_states_is_seen_beside_what_was_measured_however_far_off():
+    """A free run that drifts is cut off; a force that is wrong all along had been, too."""
+    (one,) = decay().recordings
+    far = {name: 3.0 * values for name, values in one.measured.items()}
+    overlay = overlay_figure(replace(one, simulated={PLAIN: far})).axes[0]
+    drifting = overlay_figure(replace(one, simulated={PLAIN: far, FREE_RUN: far})).axes[0]
+
+    (highest,) = (1e-5 * values.max() for values in far.values())
+    assert overlay.get_ylim()[1] > highest > drifting.get_ylim()[1]
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])

@@ -98,7 +98,8 @@ def _draw_overlay(axes: Axes, each: RecordingComparison, name: str) -> None:
             drawn = thinned(each.time_s, to_people(each.simulated[horizon][name]))
             axes.plot(*drawn, linestyle=style, color=colour, label=horizon)
     axes.set_ylabel(labelled(name).replace(" (", "\n("))
-    _hold_range(axes, measured)
+    if FREE_RUN in each.simulated:
+        _hold_range(axes, measured)
 
 
 def _hold_range(axes: Axes, measured: np.ndarray) -> None:
