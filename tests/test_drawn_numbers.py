@@ -50,6 +50,21 @@ def test_panels_of_a_grid_are_named_by_their_column_and_their_row(estimators, tm
     ]
 
 
+def test_an_estimate_that_is_off_for_one_sample_of_a_long_run_is_drawn():
+    """As at an impact: every twentieth sample of 3 s at 10 kHz had been, whatever was between."""
+    truth = np.zeros(30_000)
+    state = truth.copy()
+    state[12_345] = 5e-3
+    run = SimpleNamespace(
+        names=("slide.position_m",), state=lambda _: state, deviation=lambda _: 1e-3 + truth
+    )
+    axes = band_figure({"ekf": run}, {"slide.position_m": truth}, 1e-4).axes[0]
+
+    time_s, error_mm = axes.lines[0].get_data()
+    assert error_mm.max() == pytest.approx(5.0)
+    assert time_s[error_mm.argmax()] == pytest.approx(1.2345)
+
+
 def decay():
     rng = np.random.default_rng(2)
     pressure_pa = np.linspace(5e5, 4.9e5, 400) + 500 * rng.standard_normal(400)
