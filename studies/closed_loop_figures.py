@@ -89,12 +89,11 @@ def check_figures(check: Check) -> dict[str, Figure]:
 
 
 def _styles(records: dict[str, LoopRecord]) -> list[dict[str, Any]]:
-    """One colour per design, and a kind of line of its own for each run, as a grey print asks."""
-    designs = list(dict.fromkeys(name.rpartition(", ")[0] for name in records))
+    """One colour per design, or per run of a single one, and a kind of line of its own for each."""
+    designs = [name.rpartition(", ")[0] for name in records]
+    alike = designs if len(set(designs)) > 1 else list(records)
+    places = list(dict.fromkeys(alike))
     return [
-        {
-            "color": f"C{designs.index(name.rpartition(', ')[0])}",
-            "linestyle": kind_of_line(k),
-        }
-        for k, name in enumerate(records)
+        {"color": f"C{places.index(name)}", "linestyle": kind_of_line(k)}
+        for k, name in enumerate(alike)
     ]

@@ -120,6 +120,24 @@ def test_all_runs_that_a_check_draws_are_told_apart(drawn):
         assert len(looks) == len(lines) == FEW
 
 
+def test_estimators_of_one_design_have_colours_of_their_own():
+    """One colour was the design's: what two of them did was told apart by dashes alone."""
+    lines = [line for line in closed_loops(("lq",)).axes[1].lines if "lq" in line.get_label()]
+
+    assert [line.get_color() for line in lines] == ["C0", "C1"]
+
+
+def test_the_marks_of_what_is_missed_are_told_in_a_legend():
+    figure = FIGURES["spread"]()
+
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == [
+        "share up to it",
+        "missed",
+        "asked for",
+    ]
+
+
 def curves(label="time (s)", width_in=7.16, **looks):
     two = {"style": "-", "colour": "#0072B2"} | looks
     lines = [Line(X, X, "one", "-", "#D55E00"), Line(X, -X, "two", **two)]
