@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 LINES = {ONE_STEP: ("-.", ORANGE), WINDOW: ("-", BLUE), FREE_RUN: ("--", RED), PLAIN: ("-", BLUE)}
 OVERLAID = (FREE_RUN, WINDOW, PLAIN)
 IN_A_COLUMN = 4  # outputs
-BARS_IN = 3.3  # across the bars of the regimes, beside their names
+BARS_IN = 3.6  # across the bars of the regimes, beside their names
 
 
 def comparison_figures(found: Comparison, prefix: str = "") -> dict[str, Figure]:
