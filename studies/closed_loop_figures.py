@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from linearize.standard import POSITION
 from studies.closed_loop_check import Check
-from studies.figures.style import PAGE_IN, kind_of_line, new_figure
+from studies.figures.style import PAGE_IN, kind_of_line, literal, new_figure
 from studies.scenarios import LATE_S
 from studies.text import number
 
@@ -65,10 +65,11 @@ def draw_command(axes: Axes, records: dict[str, LoopRecord]) -> None:
 
 
 def by_scenario(check: Check | FollowingCheck) -> dict[str, dict[str, LoopRecord]]:
-    """Records of each scenario, by design and estimator."""
+    """Records of each scenario, by design and estimator as a legend takes them."""
     found: dict[str, dict[str, LoopRecord]] = {}
     for row, record in zip(check.rows, check.records, strict=True):
-        found.setdefault(row.scenario, {})[f"{row.design}, {row.estimator}"] = record
+        name = literal(f"{row.design}, {row.estimator}")
+        found.setdefault(row.scenario, {})[name] = record
     return found
 
 
@@ -88,12 +89,11 @@ def check_figures(check: Check) -> dict[str, Figure]:
 
 
 def _styles(records: dict[str, LoopRecord]) -> list[dict[str, Any]]:
-    """One colour per design, and a kind of line of its own for each run, as a grey print asks."""
-    designs = list(dict.fromkeys(name.rpartition(", ")[0] for name in records))
+    """One colour per design, or per run of a single one, and a kind of line of its own for each."""
+    designs = [name.rpartition(", ")[0] for name in records]
+    alike = designs if len(set(designs)) > 1 else list(records)
+    places = list(dict.fromkeys(alike))
     return [
-        {
-            "color": f"C{designs.index(name.rpartition(', ')[0])}",
-            "linestyle": kind_of_line(k),
-        }
-        for k, name in enumerate(records)
+        {"color": f"C{places.index(name)}", "linestyle": kind_of_line(k)}
+        for k, name in enumerate(alike)
     ]

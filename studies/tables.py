@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from io import StringIO
+from itertools import count
 from pathlib import Path
 
 from workbench.whole_file import whole_file
@@ -90,7 +91,10 @@ def note(table: Table) -> None:
 
 
 def write_tables(text: str, noted: Iterable[Table], folder: Path) -> list[str]:
-    """Tables that the text holds, in its order: ``table_1.csv`` and ``.tex``, and so on."""
+    """Tables that the text holds, in its order: ``table_1.csv`` and ``.tex``, and so on.
+
+    Further ones that a former run left there are taken away: they are not of this text.
+    """
     held = {table.text: table for table in noted if table.rows and table.text in text}
     names = []
     for number, shown in enumerate(sorted(held, key=text.index), start=1):
@@ -98,7 +102,18 @@ def write_tables(text: str, noted: Iterable[Table], folder: Path) -> list[str]:
         for ending, content in (("csv", held[shown].csv), ("tex", held[shown].latex)):
             with whole_file(folder / f"{names[-1]}.{ending}") as unfinished:
                 unfinished.write_text(content, encoding="utf-8")
+    _remove_from(len(names) + 1, folder)
     return names
+
+
+def _remove_from(number: int, folder: Path) -> None:
+    """Take away the tables from a number on, as far as they follow one another in both forms."""
+    for k in count(number):
+        pair = [folder / f"table_{k}.{ending}" for ending in ("csv", "tex")]
+        if not all(path.is_file() for path in pair):
+            return
+        for path in pair:
+            path.unlink()
 
 
 def _numeric(word: str) -> bool:

@@ -259,6 +259,9 @@ def test_without_position_and_commands_there_are_fewer_maps():
     found = compare(chamber, [recording])
 
     assert set(comparison_figures(found)) == {"comparison_decay", "residuals_decay"}
+    (late,) = compare(chamber, [replace(recording, begins_s=1234.5)]).recordings
+    said = "times count from the first sample, at 1234.5 s in its file"
+    assert said in late.notes and said not in found.recordings[0].notes
 
 
 def test_a_plant_with_one_state_is_compared_over_all_horizons():

@@ -1,6 +1,7 @@
 """The table beside a figure tells every panel and every curve apart."""
 
 import csv
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,7 +13,7 @@ from studies.figures.residuals import residual_figure
 from studies.figures.robustness import influence_figure, spread_figure
 from studies.figures.style import new_figure, save, styled
 from studies.robustness import Line, Robustness
-from workbench.comparison.compare import compare
+from workbench.comparison.compare import FREE_RUN, PLAIN, compare
 from workbench.recording import Recording
 from workbench.rig import default_rig
 
@@ -49,6 +50,21 @@ def test_panels_of_a_grid_are_named_by_their_column_and_their_row(estimators, tm
     ]
 
 
+def test_an_estimate_that_is_off_for_one_sample_of_a_long_run_is_drawn():
+    """As at an impact: every twentieth sample of 3 s at 10 kHz had been, whatever was between."""
+    truth = np.zeros(30_000)
+    state = truth.copy()
+    state[12_345] = 5e-3
+    run = SimpleNamespace(
+        names=("slide.position_m",), state=lambda _: state, deviation=lambda _: 1e-3 + truth
+    )
+    axes = band_figure({"ekf": run}, {"slide.position_m": truth}, 1e-4).axes[0]
+
+    time_s, error_mm = axes.lines[0].get_data()
+    assert error_mm.max() == pytest.approx(5.0)
+    assert time_s[error_mm.argmax()] == pytest.approx(1.2345)
+
+
 def decay():
     rng = np.random.default_rng(2)
     pressure_pa = np.linspace(5e5, 4.9e5, 400) + 500 * rng.standard_normal(400)
@@ -80,6 +96,32 @@ def test_panels_of_residuals_are_those_of_their_output(tmp_path):
         "spectral density",
         "autocorrelation",
     ] * 2
+
+
+def test_a_plant_without_states_is_seen_beside_what_was_measured_however_far_off():
+    """A free run that drifts is cut off; a force that is wrong all along had been, too."""
+    (one,) = decay().recordings
+    far = {name: 3.0 * values for name, values in one.measured.items()}
+    overlay = overlay_figure(replace(one, simulated={PLAIN: far})).axes[0]
+    drifting = overlay_figure(replace(one, simulated={PLAIN: far, FREE_RUN: far})).axes[0]
+
+    (highest,) = (1e-5 * values.max() for values in far.values())
+    assert overlay.get_ylim()[1] > highest > drifting.get_ylim()[1]
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_what_is_said_of_a_correlation_covers_none_of_it(sign):
+    """As of slow errors, whose correlation is near one all along."""
+    (one,) = decay().recordings
+    (name, residual) = next(iter(one.residuals.items()))
+    high = replace(residual, correlation=sign * np.ones_like(residual.lag_s))
+    figure = residual_figure(replace(one, residuals={name: high}))
+    figure.draw_without_rendering()
+
+    axes = figure.axes[1]
+    (line,), (said,) = axes.lines, axes.texts
+    heights = axes.transData.transform(np.column_stack(line.get_data()))[:, 1]
+    assert said.get_window_extent().y0 > heights.max()
 
 
 def test_a_spread_is_named_by_its_line_and_so_are_its_curves(tmp_path):
@@ -136,3 +178,24 @@ def test_points_with_error_bars_are_named_by_their_label(tmp_path):
     ((_, found),) = table(figure, tmp_path).items()
     assert [*found] == ["exhaust path", "supply path", "rig"]
     assert found["supply path"] == [("4", "0"), ("6", "3")]
+
+
+def test_the_ends_of_error_bars_stand_beside_their_points_and_nowhere_else(tmp_path):
+    with styled():
+        figure = new_figure(3.5, 2.0)
+        left, right = figure.subplots(1, 2)
+        left.plot([0.0, 9.0], [1.0, 2.0], label="fitted")
+        left.errorbar([4.0, 6.0], [1.0, 3.0], [0.1, np.nan], fmt="s", label="runs")
+        left.set_ylabel("force (N)")
+        right.plot([5.0], [7.0], label="rest")
+        right.set_ylabel("place (mm)")
+    save(figure, tmp_path / "one", "x")
+
+    assert (tmp_path / "one.csv").read_text().splitlines() == [
+        "panel,curve,x,y,low,high",
+        "force (N),fitted,0,1,,",
+        "force (N),fitted,9,2,,",
+        "force (N),runs,4,1,0.9,1.1",
+        "force (N),runs,6,3,nan,nan",
+        "place (mm),rest,5,7,,",
+    ]

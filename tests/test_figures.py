@@ -1,5 +1,6 @@
 """Figures are fit for a journal of two columns: width, units, fonts, and lines that grey keeps."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,6 +12,7 @@ from matplotlib.colors import to_hex
 from studies.checked_runs import FEW
 from studies.closed_loop_check import Check
 from studies.closed_loop_figures import check_figures
+from studies.figures.comparison import comparison_figures
 from studies.figures.delays import delay_figure
 from studies.figures.fidelity import fidelity_figure
 from studies.figures.following import following_figures
@@ -22,6 +24,7 @@ from studies.figures.style import MOST_POINTS, new_figure, save, styled
 from studies.robustness import Line as Asked
 from studies.robustness import Robustness
 from studies.specification import read_specification
+from workbench.comparison.compare import Comparison, Regime, compare
 from workbench.plants.servo_drive import servo_drive
 from workbench.recording import Recording
 from workbench.rig import default_rig
@@ -117,6 +120,24 @@ def test_all_runs_that_a_check_draws_are_told_apart(drawn):
         assert len(looks) == len(lines) == FEW
 
 
+def test_estimators_of_one_design_have_colours_of_their_own():
+    """One colour was the design's: what two of them did was told apart by dashes alone."""
+    lines = [line for line in closed_loops(("lq",)).axes[1].lines if "lq" in line.get_label()]
+
+    assert [line.get_color() for line in lines] == ["C0", "C1"]
+
+
+def test_the_marks_of_what_is_missed_are_told_in_a_legend():
+    figure = FIGURES["spread"]()
+
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == [
+        "share up to it",
+        "missed",
+        "asked for",
+    ]
+
+
 def curves(label="time (s)", width_in=7.16, **looks):
     two = {"style": "-", "colour": "#0072B2"} | looks
     lines = [Line(X, X, "one", "-", "#D55E00"), Line(X, -X, "two", **two)]
@@ -184,3 +205,38 @@ def test_a_limit_is_drawn_on_each_side_that_it_has_in_the_unit_that_was_typed():
                for a in (velocity, pressure)]  # fmt: skip
     assert heights[0] == pytest.approx([-1.0, 1.0]) and heights[1][-1] == pytest.approx(6.0)
     assert len(pressure.lines) == 3 and velocity.get_ylabel() == "slide.velocity (m/s)"
+
+
+def compared(name):
+    """A chamber whose pressure falls, under a name of its file."""
+    pressure_pa = np.linspace(5e5, 4.9e5, 100) + np.random.default_rng(2).normal(0.0, 500.0, 100)
+    recording = Recording(name, 1e-3, {"chamber.pressure_pa": pressure_pa})
+    (found,) = compare(default_rig("closed_chamber"), [recording]).recordings
+    regimes = (Regime("moving forward", 0.9, 0.5), Regime("at rest", 0.1, 0.5))
+    return comparison_figures(Comparison("rig", (replace(found, by_regime=regimes),)))
+
+
+@pytest.mark.parametrize("name", ["a$_$b", "a$x$b", "a$b", "50 % of_x^2 & <b>"])
+def test_a_file_name_is_no_formula_in_a_figure_nor_another_one_in_its_table(name, tmp_path):
+    """Between two dollars Matplotlib had read one, and refused `a$_$b` after all the work."""
+    for number, figure in enumerate(compared(name).values()):
+        save(figure, tmp_path / f"{number}", "workbench compare")
+        titles = [figure.get_suptitle(), *(axes.get_title() for axes in figure.axes)]
+        assert any(name.replace("$", r"\$") in title for title in titles)
+
+    table = (tmp_path / "1.csv").read_text()
+    assert f'"{name}: where the error is, window; regimes overlap",of the time' in table
+
+
+def test_the_title_of_a_long_file_name_is_whole_in_its_figure():
+    for figure in compared("_".join(["day_2_of_the_campaign"] * 5)).values():
+        figure.draw_without_rendering()
+        for title in filter(None, [figure._suptitle, *(axes.title for axes in figure.axes)]):
+            box = title.get_window_extent()
+            assert box.x0 >= 0.0 and box.x1 <= figure.bbox.x1
+
+
+def test_a_design_with_dollars_in_its_name_is_no_formula_in_a_legend(tmp_path):
+    for figure in (closed_loops(("a$_$b",)), limited(("a$_$b",))):
+        save(figure, tmp_path / "one", "workbench check")
+        assert "a$_$b" in (tmp_path / "one.csv").read_text()

@@ -17,10 +17,12 @@ from studies.page.control_verbs import with_offers
 from studies.page.mode_cuts import boundaries, cuts_of, cuts_text, moved
 from studies.page.offers import mode_offers
 from studies.page.pages import TABS, all_tabs
+from studies.page.residual_tests import ResidualTests
 from studies.page.session import Role, Session, recordings, with_opened, with_rig, with_role
 from studies.page.verbs import with_compared
 from studies.page.view import Page
 from studies.specification import read_specification
+from workbench.comparison.independence import Independence
 from workbench.errors import InputError
 from workbench.rig import default_rig
 
@@ -116,6 +118,19 @@ def test_errors_are_told_by_signal_horizon_and_regime(page, compared):
     assert "at rest" in tab._regimes.text or "moving forward" in tab._regimes.text
     shares = [each.share_of_error for each in compared.compared.regimes[0]["window"]]
     assert shares == sorted(shares, reverse=True) and min(shares) >= 0.0 and max(shares) <= 1.0
+
+
+def test_the_test_of_independence_says_of_which_lags_it_tells(compared):
+    """Those below zero, which show feedback, are drawn beside them and do not count."""
+    (residual, *_) = compared.compared.comparison.recordings[0].residuals.values()
+    lags = np.arange(-2.0, 3.0)
+    against = Independence("valve.command_v", lags, 1.0 * (lags >= 0.0), np.full(5, 0.5))
+    tests = ResidualTests()
+    tests.build()
+    tests.show("slide.position_m", residual, against)
+
+    said = "from valve.command, from lag 0 on: 100 % of the lags outside"
+    assert said in tests._titles[1].text
 
 
 def test_what_is_wrong_is_said_on_the_page_and_changes_nothing(page):

@@ -217,6 +217,21 @@ def test_written_pieces_are_found_again(tmp_path):
     assert read_recording(rig, tmp_path / "out.csv").starts == cut.starts
 
 
+@pytest.mark.parametrize("begins_s", [0.0, 1234.5, 1.7e9])
+def test_what_is_written_has_the_clock_of_the_file_that_it_is_from(tmp_path, begins_s):
+    """Laid over its recording, a simulation had stood where that one's file began at zero."""
+    rows = table(100)
+    lines = [f"{begins_s + t:.3f},{u},{p},{y}" for t, u, p, y in rows]
+    found = read(tmp_path, "\n".join([",".join(NAMES), *lines]) + "\n")
+    write_recording(found.part(20, 60), tmp_path / "out.csv")
+
+    times = np.genfromtxt(tmp_path / "out.csv", delimiter=",", skip_header=2)[:, 0]
+    assert found.time_s[0] == 0.0 and found.begins_s == begins_s
+    np.testing.assert_allclose(times - begins_s, 1e-3 * np.arange(20, 60), atol=1e-6)
+    back = read_recording(default_rig("servo_drive"), tmp_path / "out.csv")
+    assert back.sample_time_s == pytest.approx(1e-3) and len(back) == 40
+
+
 def test_ten_seconds_at_a_kilohertz_are_read_at_once(tmp_path, monkeypatch):
     """By numpy: 0.04 s on an idle machine; cell by cell it takes fifty times that."""
     monkeypatch.setattr(text_table, "_cell_by_cell", lambda *asked: pytest.fail("cell by cell"))

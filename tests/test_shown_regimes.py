@@ -33,3 +33,16 @@ def test_the_figure_shows_the_same_regimes_and_that_they_overlap():
 
     assert [t.get_text() for t in axes.get_yticklabels()][-1] == "release"
     assert "overlap" in axes.get_title()
+
+
+def test_the_legend_is_beside_the_bars_where_all_of_them_are_long():
+    """Of a recording at rest every regime has all of the time."""
+    each = SimpleNamespace(
+        name="rest", judged="window", by_regime=[Regime("at rest", 1.0, 1.0)] * 6
+    )
+    figure = regime_figure(each)
+    figure.draw_without_rendering()
+
+    (axes,), (legend,) = figure.axes, figure.legends
+    assert axes.get_legend() is None
+    assert not legend.get_window_extent().overlaps(axes.get_tightbbox())

@@ -35,6 +35,19 @@ def test_latex_has_a_column_each_and_no_letter_that_it_would_take_for_a_command(
     assert lines[7:] == [r"\bottomrule", r"\end{tabular}"]
 
 
+def test_of_a_former_run_no_table_stays_beside_fewer_new_ones(tmp_path):
+    """As of two recordings, and then of one: the second's would be taken for this one's."""
+    with noted_tables() as noted:
+        texts = [columns(HEAD, ROWS), columns(("one", "two"), [("3", "4")])]
+    write_tables("\n\n".join(texts), noted, tmp_path)
+    (tmp_path / "table_4.csv").write_text("of somebody else\n")
+    write_tables(texts[1], noted, tmp_path)
+
+    left = sorted(path.name for path in tmp_path.iterdir())
+    assert left == ["table_1.csv", "table_1.tex", "table_4.csv"]
+    assert (tmp_path / "table_1.csv").read_text() == "one,two\n3,4\n"
+
+
 def test_nothing_is_noted_outside_and_the_innermost_gets_it():
     columns(HEAD, ROWS)
     with noted_tables() as outer, noted_tables() as inner:

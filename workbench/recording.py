@@ -25,6 +25,8 @@ class Recording:
         Pieces are simulated separately.
     unmapped
         Names of the columns in its file that the rig does not read.
+    begins_s
+        Time of its first sample on the clock of its file.
     """
 
     name: str
@@ -34,6 +36,7 @@ class Recording:
     starts: tuple[int, ...] = (0,)
     source: str = ""
     unmapped: tuple[str, ...] = ()
+    begins_s: float = 0.0
 
     def __post_init__(self) -> None:
         lengths = {channel: len(values) for channel, values in self.channels.items()}
@@ -63,7 +66,8 @@ class Recording:
         """Samples ``first`` up to, not including, ``last``."""
         cut = {name: values[first:last] for name, values in self.channels.items()}
         inside = tuple(start - first for start in self.starts if first < start < last)
-        return replace(self, channels=cut, starts=(0, *inside))
+        begins_s = self.begins_s + self.sample_time_s * first
+        return replace(self, channels=cut, starts=(0, *inside), begins_s=begins_s)
 
     @property
     def pieces(self) -> tuple[Recording, ...]:

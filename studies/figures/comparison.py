@@ -9,7 +9,17 @@ import numpy as np
 
 from studies.figures.error_maps import map_figure
 from studies.figures.residuals import residual_figure
-from studies.figures.style import BLUE, GREY, ORANGE, PAGE_IN, RED, new_figure, styled, thinned
+from studies.figures.style import (
+    BLUE,
+    GREY,
+    ORANGE,
+    PAGE_IN,
+    RED,
+    headline,
+    new_figure,
+    styled,
+    thinned,
+)
 from studies.text import labelled
 from studies.text_of_comparison import shown_regimes
 from workbench.comparison.compare import FREE_RUN, ONE_STEP, PLAIN, WINDOW
@@ -24,6 +34,7 @@ if TYPE_CHECKING:
 LINES = {ONE_STEP: ("-.", ORANGE), WINDOW: ("-", BLUE), FREE_RUN: ("--", RED), PLAIN: ("-", BLUE)}
 OVERLAID = (FREE_RUN, WINDOW, PLAIN)
 IN_A_COLUMN = 4  # outputs
+BARS_IN = 3.6  # across the bars of the regimes, beside their names
 
 
 def comparison_figures(found: Comparison, prefix: str = "") -> dict[str, Figure]:
@@ -67,9 +78,8 @@ def overlay_figure(each: RecordingComparison) -> Figure:
             if k + across >= len(names):
                 lower.set_xlabel("time (s)")
                 lower.tick_params(labelbottom=True)
-        figure.suptitle(
-            f"{each.name}: measured, simulated and error, worst windows shaded", fontsize=8
-        )
+        title = f"{each.name}: measured, simulated and error, worst windows shaded"
+        figure.suptitle(headline(title, PAGE_IN), fontsize=8)
         handles, labels = panels[0, 0].get_legend_handles_labels()
         more, words = panels[1, 0].get_legend_handles_labels()
         columns = len(handles) + len(more)
@@ -88,7 +98,8 @@ def _draw_overlay(axes: Axes, each: RecordingComparison, name: str) -> None:
             drawn = thinned(each.time_s, to_people(each.simulated[horizon][name]))
             axes.plot(*drawn, linestyle=style, color=colour, label=horizon)
     axes.set_ylabel(labelled(name).replace(" (", "\n("))
-    _hold_range(axes, measured)
+    if FREE_RUN in each.simulated:
+        _hold_range(axes, measured)
 
 
 def _hold_range(axes: Axes, measured: np.ndarray) -> None:
@@ -121,7 +132,7 @@ def regime_figure(each: RecordingComparison) -> Figure:
     """Share of the error beside the share of the time, by regime; regimes overlap."""
     shown = shown_regimes(each.by_regime)
     with styled():
-        figure = new_figure(PAGE_IN / 1.5, 0.8 + 0.26 * len(shown))
+        figure = new_figure(PAGE_IN / 1.5, 1.0 + 0.26 * len(shown))
         axes = figure.subplots()
         rows = np.arange(len(shown))
         error = [100.0 * regime.share_of_error for regime in shown]
@@ -132,6 +143,8 @@ def regime_figure(each: RecordingComparison) -> Figure:
         axes.invert_yaxis()
         axes.grid(False, axis="y")
         axes.set_xlabel("share (%)")
-        axes.set_title(f"{each.name}: where the error is, {each.judged}; regimes overlap")
-        axes.legend()
+        title = f"{each.name}: where the error is, {each.judged}; regimes overlap"
+        axes.set_title(headline(title, BARS_IN))
+        axes.set_label(title)  # in the table
+        figure.legend(loc="outside lower center", ncols=2)  # all bars may be long
     return figure

@@ -30,17 +30,33 @@ SCALE = "<colorbar>"
 
 
 def write_drawn(figure: Figure, path: Path) -> None:
-    """One row per point: panel, curve, x and y."""
+    """One row per point: panel, curve, x and y; the ends of its error bar, where any has one."""
+    ends = [_bar_ends(axes) for axes in figure.axes]
+    more = ("low", "high") if any(ends) else ()
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(("panel", "curve", "x", "y"))
-        for axes, panel in zip(figure.axes, panel_names(figure), strict=True):
+        writer.writerow(("panel", "curve", "x", "y", *more))
+        for axes, panel, own in zip(figure.axes, panel_names(figure), ends, strict=True):
             found = [*_curves(axes)]
             named = curve_names(axes, found)
-            for curve, (_, x, y) in zip(named, found, strict=True):
+            for k, (curve, (_, x, y)) in enumerate(zip(named, found, strict=True)):
+                names = _as_named(panel), _as_named(curve)
+                bars = own.get(k, [("",) * len(more)] * len(x))
                 writer.writerows(
-                    (panel, curve, _short(a), _short(b)) for a, b in zip(x, y, strict=True)
+                    (*names, *map(_short, (a, b, *bar)))
+                    for a, b, bar in zip(x, y, bars, strict=True)
                 )
+
+
+def _bar_ends(axes: Axes) -> dict[int, list[tuple[float, float]]]:
+    """Lower and upper ends of the error bars of each line that has them, by its number."""
+    found = {}
+    for each in axes.containers:
+        if getattr(each, "has_yerr", False):
+            points, _, bars = each.lines
+            ends = [bar.vertices[:, 1] for bar in bars[-1].get_paths()]
+            found[list(axes.lines).index(points)] = [(low, high) for low, high in ends]
+    return found
 
 
 def panel_names(figure: Figure) -> list[str]:
@@ -214,6 +230,11 @@ def _words(axis: Axis) -> dict[float, str]:
     ticks = axis.get_ticklocs()
     labels = axis.get_major_formatter().format_ticks(ticks)
     return {round(float(at), 6): label for at, label in zip(ticks, labels, strict=True)}
+
+
+def _as_named(words: str) -> str:
+    """Words of a figure without what keeps a dollar from beginning a formula."""
+    return words.replace(r"\$", "$")
 
 
 def _short(value: object) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from studies.figures.style import PAGE_IN, new_figure, styled
+from studies.figures.style import PAGE_IN, headline, new_figure, styled
 from studies.text import labelled
 from workbench.units import display_scale, display_unit, public_name
 
@@ -28,7 +28,8 @@ def map_figure(maps: Sequence[ErrorMap], title: str) -> Figure:
     across = min(len(maps), ACROSS)
     down = ceil(len(maps) / across)
     with styled():
-        figure = new_figure(PAGE_IN if across > 1 else PAGE_IN / 2, 0.5 + 2.1 * down)
+        width_in = PAGE_IN if across > 1 else PAGE_IN / 2
+        figure = new_figure(width_in, 0.5 + 2.1 * down)
         panels = figure.subplots(down, across, squeeze=False).flatten()
         for axes in panels[len(maps) :]:
             axes.set_visible(False)
@@ -49,7 +50,7 @@ def map_figure(maps: Sequence[ErrorMap], title: str) -> Figure:
             bar = figure.colorbar(drawn, ax=axes)
             bar.set_label(f"RMS error ({display_unit(each.output)})")
             bar.outline.set_visible(False)
-        figure.suptitle(f"{title}; grey: too few samples", fontsize=8)
+        figure.suptitle(headline(f"{title}; grey: too few samples", width_in), fontsize=8)
     return figure
 
 

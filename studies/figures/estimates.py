@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from studies.figures.style import BLUE, ORANGE, PAGE_IN, new_figure, styled
+from studies.figures.style import BLUE, ORANGE, PAGE_IN, new_figure, styled, thinned
 from workbench.units import display_scale, display_unit, public_name
 
 if TYPE_CHECKING:
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from studies.estimator_runs import Followed
 
 MOST_STATES = 4
-POINTS = 1500
 BEYOND = 1.4  # times the widest late band: the start of a run is cut off
 
 
@@ -70,11 +69,12 @@ def band_figure(
 
 
 def _band(axes: Axes, run: Followed, name: str, true: np.ndarray, sample_time_s: float) -> None:
-    every = max(len(true) // POINTS, 1)
     factor = 1.0 / display_scale(name).factor
-    time_s = (sample_time_s * np.arange(len(true)))[::every]
-    deviation = factor * run.deviation(name)[::every]
-    error = factor * (run.state(name) - true)[::every]
+    time_s, error, deviation = thinned(
+        sample_time_s * np.arange(len(true)),
+        factor * (run.state(name) - true),
+        factor * run.deviation(name),
+    )
     axes.fill_between(
         time_s, -2 * deviation, 2 * deviation, color=ORANGE, alpha=0.35, linewidth=0.0,
         label="two standard deviations",

@@ -16,6 +16,7 @@ from studies.figures.style import (
     PAGE_IN,
     PURPLE,
     RED,
+    headline,
     new_figure,
     styled,
     thinned,
@@ -155,7 +156,8 @@ def wall_heat_figure(found: WallHeatFit) -> Figure:
     """Each decay with its exponential and with the fitted heat law, and their residuals."""
     pairs = list(zip(found.curves[::2], found.curves[1::2], strict=True))
     with styled():
-        figure = new_figure(COLUMN_IN if len(pairs) == 1 else PAGE_IN, 3.6)
+        width_in = COLUMN_IN if len(pairs) == 1 else PAGE_IN
+        figure = new_figure(width_in, 3.6)
         panels = figure.subplots(2, len(pairs), sharex="col", height_ratios=(2, 1), squeeze=False)
         for (upper, lower), (exponential, law) in zip(panels.T, pairs, strict=True):
             time_s, measured = thinned(law.along, law.measured)
@@ -169,7 +171,7 @@ def wall_heat_figure(found: WallHeatFit) -> Figure:
                 smooth = np.convolve(curve.residual, np.ones(SMOOTHED) / SMOOTHED, mode="valid")
                 middle = law.along[SMOOTHED // 2 :][: len(smooth)]
                 lower.plot(*thinned(middle, smooth), linestyle=style, color=colour)
-            upper.set_title(law.label.partition(",")[0])
+            upper.set_title(headline(law.label.rpartition(",")[0], width_in / len(pairs)))
             lower.set_xlabel("time from the stop (s)")
         panels[0, 0].set_ylabel(f"{found.chamber.replace('_', ' ')} pressure (bar)")
         panels[1, 0].set_ylabel(f"residual (Pa)\nmean of {SMOOTHED}")

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from studies.figures.panels import Line, Panel, panels_figure
-from studies.figures.style import PAGE_IN, kind_of_line
+from studies.figures.style import PAGE_IN, kind_of_line, literal
 from studies.specification import Limit
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def _panel(limit: Limit, runs: Sequence[tuple[str, Recording]], last: bool) -> P
         return limit.scale.from_si(value)
 
     lines = [
-        Line(run.time_s, shown(run[limit.figure]), name, kind_of_line(k), f"C{k}")
+        Line(run.time_s, shown(run[limit.figure]), literal(name), kind_of_line(k), f"C{k}")
         for k, (name, run) in enumerate(runs)
     ]
     ends = sorted({shown(end) for end in limit.ends})

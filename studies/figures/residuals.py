@@ -6,10 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from studies.figures.style import BLUE, GREY, PAGE_IN, RED, new_figure, styled
+from studies.figures.style import BLUE, GREY, PAGE_IN, RED, headline, new_figure, styled
 from studies.text import outside_band
 from workbench.comparison.compare import ONE_STEP, PLAIN
 from workbench.units import display_scale, display_unit, public_name
+
+ROOM = 1.4  # of a correlation above zero, for what is said of it
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,7 +34,7 @@ def residual_figure(each: RecordingComparison) -> Figure:
         panels[-1, 1].set_xlabel("lag (s)")
         panels[0, 0].set_title("spectral density")
         panels[0, 1].set_title("autocorrelation; 95 % of white noise within the band")
-        figure.suptitle(f"{each.name}: error, {horizon}", fontsize=8)
+        figure.suptitle(headline(f"{each.name}: error, {horizon}", PAGE_IN), fontsize=8)
         pairs = [axes.get_legend_handles_labels() for axes in panels[0]]
         (lines, words), (more, others) = pairs
         figure.legend(lines + more, words + others, loc="outside lower center", ncols=4)
@@ -57,7 +59,7 @@ def _draw_correlation(axes: Axes, name: str, residual: Residual) -> None:
     axes.fill_between(lags, -bands, bands, color=GREY, alpha=0.5, linewidth=0, label="band")
     axes.plot(lags, values, "o-", color=BLUE, markersize=1.5, linewidth=0.5, label="correlation")
     most = 1.15 * max(np.max(np.abs(values), initial=0.0), np.max(2.0 * bands, initial=0.0))
-    axes.set_ylim(-(most or 1.0), most or 1.0)
+    axes.set_ylim(-(most or 1.0), ROOM * (most or 1.0))
     axes.set_ylabel("correlation (-)")
     axes.annotate(
         outside_band(residual.outside),

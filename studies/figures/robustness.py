@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from studies.robustness import Line, Robustness
 
 COLUMNS = 3
-ROW_IN = 1.8
+ROW_IN, LEGEND_IN = 1.8, 0.2
 MOST_PARAMETERS = 12  # in the map, the strongest
 LONG = 20  # letters of a line that does not fit below its column
 DARK = 0.6  # from there on the map is too dark for black letters
@@ -26,11 +26,12 @@ DARK = 0.6  # from there on the map is too dark for black letters
 def spread_figure(found: Robustness, limits: Mapping[str, float]) -> Figure:
     """Share of the draws up to each figure, one panel a line.
 
-    ``limits`` are by line, in its unit; draws that miss the line are marked on the axis.
+    ``limits`` are by line, in its unit; draws that miss the line are marked on the axis.  One
+    legend tells of all panels.
     """
     with styled():
         rows = -(-len(found.lines) // COLUMNS)
-        figure = new_figure(PAGE_IN, ROW_IN * rows)
+        figure = new_figure(PAGE_IN, ROW_IN * rows + LEGEND_IN)
         panels = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
         for axes, line in zip(panels, found.lines, strict=False):
             _draw_spread(axes, line, limits.get(line.name))
@@ -38,6 +39,11 @@ def spread_figure(found: Robustness, limits: Mapping[str, float]) -> Figure:
             axes.set_visible(False)
         for axes in panels[::COLUMNS]:
             axes.set_ylabel(f"{found.each}s (%)")
+        pairs = [axes.get_legend_handles_labels() for axes in panels]
+        known = {
+            word: line for lines, words in pairs for line, word in zip(lines, words, strict=True)
+        }
+        figure.legend(known.values(), known.keys(), loc="outside lower center", ncols=len(known))
     return figure
 
 

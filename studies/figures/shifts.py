@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from linearize.shifting import POSITION
-from studies.figures.style import COLUMN_IN, GREY, look, new_figure
+from studies.figures.style import COLUMN_IN, GREY, literal, look, new_figure
 from studies.shift_check import OPEN_LOOP, SETTLED_M, ShiftCheck
 from workbench.plants.gearbox import COMMANDS
 
@@ -29,7 +29,7 @@ def shift_figures(found: ShiftCheck) -> dict[str, Figure]:
         _draw_open_loops(place, valves, [record for _, record in pairs])
         for k, (row, record) in enumerate(pairs):
             recording = record.recording
-            time_ms, line = 1e3 * recording.time_s, {"label": row.design, **look(k)}
+            time_ms, line = 1e3 * recording.time_s, {"label": literal(row.design), **look(k)}
             place.plot(time_ms, 1e3 * recording[POSITION], **line)
             for axes, command in zip(valves, COMMANDS, strict=True):
                 axes.step(time_ms, recording[command], where="post", **line)

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 COLUMN_IN, PAGE_IN = 3.5, 7.16
 BLUE, ORANGE, GREEN, RED = "#0072B2", "#E69F00", "#009E73", "#D55E00"
 PURPLE, SKY, BLACK, GREY = "#CC79A7", "#56B4E9", "#000000", "0.6"
+LETTERS_PER_IN = 16  # of a title, as the mean of a text; capitals take more
 MOST_POINTS = 2000  # of a curve, and as many peaks; more are not seen and swell the files
 
 _COLOURS = (BLUE, RED, GREEN, ORANGE, PURPLE, SKY, BLACK)
@@ -68,6 +70,17 @@ def new_figure(width_in: float, height_in: float) -> Figure:
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width_in, height_in), layout="constrained")
+
+
+def literal(name: str) -> str:
+    """A name as it is: between two dollars Matplotlib reads a formula, or fails to."""
+    return name.replace("$", r"\$")
+
+
+def headline(text: str, width_in: float) -> str:
+    """A title with the name of a file in it, as it is, on as many lines as the width asks for."""
+    letters = int(LETTERS_PER_IN * width_in)
+    return literal("\n".join(line for part in text.splitlines() for line in wrap(part, letters)))
 
 
 def kind_of_line(k: int) -> Any:

@@ -69,7 +69,7 @@ class RecordingTab:
             title="Or begin with a plant", options=[PLANT, *PLANTS], value=PLANT, width=240
         )
         self._plant.on_change("value", self._begin)
-        self._file = TextInput(title="Recording (CSV, MAT)", width=360, name="recording_file")
+        self._file = TextInput(title="Recording (CSV, MAT, MDF)", width=360, name="recording_file")
         self._here = Select(
             title="Recordings beside the rig", options=[NONE], value=NONE, width=280
         )

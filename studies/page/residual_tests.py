@@ -59,7 +59,8 @@ class ResidualTests:
                   _said(f"Whiteness of {output}, one step ahead", residual.outside))  # fmt: skip
         self._pairs[1].visible = against is not None
         if against is not None:
-            what = f"Independence of {output} from {public_name(against.against)}"
+            input_ = public_name(against.against)
+            what = f"Independence of {output} from {input_}, from lag 0 on"
             told = _said(what, against.outside)
             self._put(1, against.lag_s, against.correlation, against.bands, told)
 

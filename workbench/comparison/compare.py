@@ -168,6 +168,7 @@ def _compared(rig: Rig, recording: Recording) -> RecordingComparison:
         shifts=shifts,
         notes=(
             *_pieces_in_words(recording),
+            *_begin_in_words(recording),
             *notes,
             *more,
             *filter(None, (each.sentence for each in noise.values())),
@@ -218,6 +219,13 @@ def _pieces_in_words(recording: Recording) -> tuple[str, ...]:
     begins = ", ".join(f"{recording.sample_time_s * first:.4g}" for first in recording.starts)
     told = f"{len(recording.starts)} pieces stand one behind the other"
     return (f"{told}, from {begins} s on: times leave the gaps out",)
+
+
+def _begin_in_words(recording: Recording) -> tuple[str, ...]:
+    """When a recording begins, where its file does not count from zero or its first step."""
+    if abs(recording.begins_s) < 1.5 * recording.sample_time_s:
+        return ()
+    return (f"times count from the first sample, at {recording.begins_s:.10g} s in its file",)
 
 
 def _worst(squared: np.ndarray, recording: Recording, window_s: float) -> tuple[Span, ...]:

@@ -29,6 +29,11 @@ class Grid:
     grids_s: tuple[np.ndarray, ...] | None
 
     @property
+    def begins_s(self) -> float:
+        """Time of the first sample on the grid."""
+        return float(self.grids_s[0][0] if self.grids_s else self.time_s[self.pieces[0]][0])
+
+    @property
     def starts(self) -> tuple[int, ...]:
         """First sample of each piece on the grid."""
         lengths = (

@@ -80,6 +80,7 @@ def _recording(
         starts=grid.starts,
         source=str(path),
         unmapped=unmapped,
+        begins_s=grid.begins_s,
     )
 
 
