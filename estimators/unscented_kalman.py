@@ -142,10 +142,11 @@ class UnscentedKalman(StochasticPlant):
     @cached_property
     def _outputs(self) -> ca.Function:
         """(X, u, d, p), a column per point -> outputs."""
-        n, S, model = len(self.plant.scale), self.extended.filter.scale, self.plant.model
-        X = ca.MX.sym("X", len(S))
-        u, d, p = (ca.MX.sym(k, s.numel()) for k, s in zip("udp", model.symbols[1:], strict=True))
-        y = model.h(S[:n] * X[:n], u, d, p)
+        n, found, symbols = len(self.plant.scale), self.extended.filter, self.plant.model.symbols
+        X = ca.MX.sym("X", len(found.scale))
+        u, d, p = (ca.MX.sym(k, s.numel()) for k, s in zip("udp", symbols[1:], strict=True))
+        real = found.scale * X
+        y, _ = found.outputs(real[:n], real[n:, 0], u, d, p)
         return ca.Function("seen", [X, u, d, p], [y]).map(2 * len(self._free) + 1)
 
 

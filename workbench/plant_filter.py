@@ -4,6 +4,7 @@ Chosen state rates may carry an unknown input, and chosen parameters may wander,
 random walks:
 
     dx/dt = f(x, u, d, p + S w) + E w + process noise,     dw/dt = noise of the given intensity
+    y = h(x, u, d, p + S w) + measurement noise
 
 The transition matrix is not differentiated through the integrator.  It is the stability function
 of Radau IIA of order 3 at a quarter of the step, squared twice: L-stable, so that a bristle at
@@ -173,10 +174,10 @@ class PlantFilter:
         u, d, p = (ca.MX.sym(k, s.numel()) for k, s in zip("udp", model.symbols[1:], strict=True))
         y, received = ca.MX.sym("y", n_y), ca.MX.sym("received", n_y)
         r = np.array([self.measurement_noise[name] for name in model.measured])
-        x = self.scale[:n] * X[:n]
-        expected, C = self._outputs(x, u, d, p)
-        C = C * np.outer(1 / r, self.scale[:n])  # outputs in units of their noise
-        H = ca.horzcat(C, ca.MX(n_y, size - n)) * ca.repmat(received, 1, size)
+        real = self.scale * X
+        expected, C = self.outputs(real[:n], real[n:, 0], u, d, p)
+        C = C * np.outer(1 / r, self.scale)  # outputs in units of their noise
+        H = C * ca.repmat(received, 1, size)
         e = received * (y - expected) / r
         S = H @ P @ H.T + ca.MX.eye(n_y)
         K = self.corrected[:, None] * ca.solve(S, H @ P).T
@@ -226,11 +227,12 @@ class PlantFilter:
         return ca.Function("likelihood", [packed, *inputs], [once(*unpacked, *inputs)])
 
     @cached_property
-    def _outputs(self) -> ca.Function:
-        """(x, u, d, p) -> (y, dy/dx)."""
-        model = self.plant.model
-        slope = ca.jacobian(model.outputs, model.symbols[0])
-        return ca.Function("outputs", [*model.symbols], [model.outputs, slope])
+    def outputs(self) -> ca.Function:
+        """(x, w, u, d, p) -> (y, dy/d(x, w))."""
+        x, u, d, p = self.plant.model.symbols
+        w = ca.SX.sym("w", len(self.unknown_inputs))
+        y = ca.substitute(self.plant.model.outputs, p, p + ca.DM(self._wandering) @ w)
+        return ca.Function("outputs", [x, w, u, d, p], [y, ca.jacobian(y, ca.vertcat(x, w))])
 
     @property
     def _entering(self) -> np.ndarray:
