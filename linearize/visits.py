@@ -159,8 +159,12 @@ def windows(seen: Visited, horizon_s: float = HORIZON_S, apart_s: float = APART_
     Raises
     ------
     ValueError
-        If there is none.
+        If there is none, or if samples are further apart than the horizon is long.
     """
+    if round(horizon_s / seen.sample_time_s) < 1:
+        raise ValueError(
+            f"no window of {horizon_s:g} s: samples are {seen.sample_time_s:g} s apart"
+        )
     n, apart = round(horizon_s / seen.sample_time_s) + 1, round(apart_s / seen.sample_time_s)
     ends = (*seen.starts[1:], seen.states.shape[1])
     firsts = [

@@ -75,6 +75,11 @@ def test_a_manoeuvre_shorter_than_the_horizon_is_an_error(seen):
         windows(seen, horizon_s=20.0)
 
 
+def test_a_horizon_shorter_than_a_sample_is_an_error(seen):
+    with pytest.raises(ValueError, match=r"no window of 0\.05 s: samples are 0\.2 s apart"):
+        windows(replace(seen, sample_time_s=0.2))
+
+
 def test_placed_modes_err_a_third_of_the_best_single_linear_model_over_50_ms(
     placed, single, unseen
 ):
