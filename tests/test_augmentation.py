@@ -1,6 +1,7 @@
 """Unknown forces, flows and parameters among the states of a plant, for every estimator alike."""
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -103,6 +104,28 @@ def test_an_unknown_offset_of_a_sensor_is_found_as_if_it_were_a_state(name):
     assert found.notes[f"unknown {unknown}"] == pytest.approx(known.state[2], rel=1e-5)
     assert found.state == pytest.approx(known.state[:2], rel=1e-5)
     assert found.covariance == pytest.approx(known.covariance[:2, :2], rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("name", "how"),
+    [
+        *product(("ekf", "ukf"), [{"unknown_inputs": {"tilt.offset_m": 1e-2}}]),
+        ("mhe", {"constants": {"tilt.offset_m": 1e-3}}),
+    ],
+)
+def test_a_gate_foresees_a_sensor_with_the_offset_that_was_estimated(name, how):
+    plant, u, y = with_an_offset()
+    estimator = ESTIMATORS[name](
+        plant=plant,
+        sample_time_s=DT_S,
+        measurement_noise={"cart.position_m": NOISE_M},
+        process_noise={"cart.velocity_m_s": 1e-2},
+        **how,
+    )
+    sight, last = Foresight(estimator), run(estimator, u[:-1], y[:-1])[-1]
+    expected, _ = sight.outputs(sight.blind(last, u[-2]), u[-2])
+
+    assert expected == pytest.approx(y[-1], abs=5.0 * NOISE_M)
 
 
 def test_what_is_unknown_must_be_a_state_or_a_parameter():
