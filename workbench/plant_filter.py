@@ -1,7 +1,6 @@
 """An extended Kalman filter on a plant, one sample as one CasADi function.
 
-Chosen state rates may carry an unknown input, and chosen parameters may wander, both modelled as
-random walks:
+Chosen state rates may carry an unknown input, chosen parameters may wander, both as random walks:
 
     dx/dt = f(x, u, d, p + S w) + E w + process noise,     dw/dt = noise of the given intensity
     y = h(x, u, d, p + S w) + measurement noise
@@ -155,11 +154,11 @@ class PlantFilter:
 
     @cached_property
     def correct(self) -> ca.Function:
-        """(X, P, u, d, p, y, received) -> (X, P, innovation, deviation, log-likelihood, i, J, L).
+        """(X, P, u, d, p, y, received) -> (X, P, innovation, spread, log-likelihood, i, J, L, G).
 
-        i = H' S^-1 e and J = H' S^-1 H are what the measurement says, L = I - K H what it leaves.
-
-        ``received`` is 1 or 0 by output; a missing value of y may hold any finite number.
+        i = H' S^-1 e and J = H' S^-1 H are what the measurement says, L = I - K H what it leaves;
+        G = [K, H' S^-1], with outputs in units of their noise.  ``received`` is 1 or 0 by output;
+        a missing value of y may hold any finite number.
         """
         told = self.correct_with_nis
         symbols = [ca.MX.sym(f"i{i}", *told.size_in(i)) for i in range(told.n_in())]
@@ -186,7 +185,8 @@ class PlantFilter:
         nis = e.T @ ca.solve(S, e)
         likely = -0.5 * (nis + ca.log(ca.det(S)) + ca.dot(received, np.log(2 * np.pi * r**2)))
         results = [X + K @ e, rest @ P @ rest.T + K @ K.T, e * r, ca.sqrt(ca.diag(S)) * r, likely]
-        results += [H.T @ weighted[:, 0], H.T @ weighted[:, 1:], rest, nis]
+        results += [H.T @ weighted[:, 0], H.T @ weighted[:, 1:], rest]
+        results += [ca.horzcat(K, weighted[:, 1:].T), nis]
         return ca.Function("correct", [X, P, u, d, p, y, received], results)
 
     @cached_property
