@@ -30,16 +30,24 @@ class Foresight:
     def outputs(self, estimate: Estimate, command: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Expected outputs (n_y,) and the covariance of a measurement of them, (n_y, n_y), in SI.
 
-        States that the estimator leaves out stand at the plant's initial values.
+        States that the estimator leaves out stand at the plant's initial values.  Parameters that
+        it estimates beside the states count as known.
         """
         plant = self.estimator.plant
-        model, (_, d, p) = plant.model, plant.nominal
+        model, d, p = plant.model, plant.nominal[1], self._parameters(estimate)
         x = plant.initial
         places = [model.states.index(name) for name in estimate.names]
         x[places] = estimate.state
         y, C = (block.full() for block in self._seen(x, command, d, p))
         H = C[:, places]
         return y.ravel(), H @ estimate.covariance @ H.T + np.diag(self._variance)
+
+    def _parameters(self, estimate: Estimate) -> np.ndarray:
+        """Those of the plant, (n_p,), where the notes of an estimate know none better."""
+        plant, told = self.estimator.plant, estimate.notes
+        pairs = zip(plant.model.parameters, plant.nominal[2], strict=True)
+        added = ((name, value + told.get(f"unknown {name}", 0.0)) for name, value in pairs)
+        return np.array([told.get(f"estimated {name}", value) for name, value in added])
 
     @cached_property
     def _seen(self) -> ca.Function:

@@ -242,7 +242,7 @@ class Horizon:
         start = now["prior"][:, 0] + now["prior"][:, 1:] @ adjoints[:, -1]
         handed = ca.horzcat(points[:, 1] + ahead[:, 0], ahead[:, 1:width])
         later = dict(points=ca.horzcat(start, points[:, 1:]), noise=self._reversed(noise))
-        nis = self.at.surprise(last, self._last(now["H"]))
+        nis = self.at.surprise(ahead[:, -width:], *map(self._last, outputs))
         told = self._cost(now), newest[:, 0], newest[:, 1:], nis
         return now | later | dict(handed=handed), told
 

@@ -116,14 +116,16 @@ class InteractingModels(StochasticPlant):
 
     @cached_property
     def transition(self) -> np.ndarray:
-        """T[i, j]: probability that regime i is followed by regime j, rows add up to one."""
+        """T[i, j]: probability that regime i is followed by regime j, rows add up to one.
+
+        exp(h G) with G = -1 / dwell on the diagonal and the rest of it shared out beside that: a
+        long sample may hold several switches, and forgets what was before.
+        """
         m = len(self.members)
         if m == 1:
             return np.ones((1, 1))
-        stays = np.exp(-self.sample_time_s / self.dwell_s)
-        return np.full((m, m), (1.0 - stays) / (m - 1)) + np.eye(m) * (
-            stays - (1.0 - stays) / (m - 1)
-        )
+        kept = np.exp(-self.sample_time_s / self.dwell_s * m / (m - 1))
+        return np.full((m, m), (1.0 - kept) / m) + kept * np.eye(m)
 
     @cached_property
     def members(self) -> dict[str, ExtendedKalman]:

@@ -84,9 +84,10 @@ class UnscentedKalman(StochasticPlant):
         outputs = self._outputs(points.T, *self._inputs(command, len(points))).full()[seen].T
         outputs = outputs / noise
         expected, S = unscented_transform(outputs, merwe.Wm, merwe.Wc, np.eye(seen.sum()))
-        across = (points - X).T @ (merwe.Wc[:, None] * (outputs - expected))
+        across = self._with_the_rest(points - X, P).T @ (merwe.Wc[:, None] * (outputs - expected))
         e = measurement[seen] / noise - expected
-        K = self.extended.filter.corrected[:, None] * np.linalg.solve(S, across.T).T
+        K = np.zeros(across.shape)
+        K[self._free] = np.linalg.solve(S, across[self._free].T).T
         # a gain that is held at 0 for the bristle is not the best one: the general form holds
         P = P - K @ across.T - across @ K.T + K @ S @ K.T
         return X + K @ e, 0.5 * (P + P.T), float(e @ np.linalg.solve(S, e))
@@ -97,6 +98,17 @@ class UnscentedKalman(StochasticPlant):
         points = np.tile(X, (2 * len(free) + 1, 1))
         points[:, free] = self._merwe.sigma_points(X[free], P[np.ix_(free, free)])
         return points
+
+    def _with_the_rest(self, off: np.ndarray, P: np.ndarray) -> np.ndarray:
+        """Points less their mean, (m, n), what is not spread as far off as it goes with the others.
+
+        Without it an output would seem to say nothing of a bristle that moves with the velocity,
+        and what P holds of both would outgrow the variances.
+        """
+        free, rest = self._free, np.setdiff1d(np.arange(len(P)), self._free)
+        known = np.linalg.pinv(P[np.ix_(free, free)], hermitian=True)
+        off[:, rest] = off[:, free] @ known @ P[np.ix_(free, rest)]
+        return off
 
     def _inputs(self, command: np.ndarray, columns: int) -> list[np.ndarray]:
         _, d, p = self.plant.nominal
@@ -142,10 +154,11 @@ class UnscentedKalman(StochasticPlant):
     @cached_property
     def _outputs(self) -> ca.Function:
         """(X, u, d, p), a column per point -> outputs."""
-        n, S, model = len(self.plant.scale), self.extended.filter.scale, self.plant.model
-        X = ca.MX.sym("X", len(S))
-        u, d, p = (ca.MX.sym(k, s.numel()) for k, s in zip("udp", model.symbols[1:], strict=True))
-        y = model.h(S[:n] * X[:n], u, d, p)
+        n, found, symbols = len(self.plant.scale), self.extended.filter, self.plant.model.symbols
+        X = ca.MX.sym("X", len(found.scale))
+        u, d, p = (ca.MX.sym(k, s.numel()) for k, s in zip("udp", symbols[1:], strict=True))
+        real = found.scale * X
+        y, _ = found.outputs(real[:n], real[n:, 0], u, d, p)
         return ca.Function("seen", [X, u, d, p], [y]).map(2 * len(self._free) + 1)
 
 

@@ -7,13 +7,13 @@ after the other, so that nothing is inverted and a missing one has weight 0.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import casadi as ca
 import numpy as np
 
-from estimators.losses import Loss
+from estimators.losses import Loss, Squared
 from workbench.plant_filter import PlantFilter
 from workbench.rosenbrock import controlled_step, single_step, steps_of
 
@@ -203,12 +203,18 @@ class WindowNodes:
 
     @cached_property
     def surprise(self) -> ca.Function:
-        """(gains, H) -> innovation squared over its covariance, of all outputs of a node."""
-        gains, H = ca.SX.sym("gains", self.n + 2, self.n_y), ca.SX.sym("H", self.n_y, self.n)
+        """((d, P), error, received, H) -> innovation squared over its covariance, of a node.
+
+        Without the weights of the loss: what it lets go is as surprising as it is.
+        """
+        plain = replace(self, loss=Squared()).correct
+        symbols = [ca.SX.sym(f"i{k}", *plain.size_in(k)) for k in range(4)]
+        (_, gains), received, H = plain(*symbols), symbols[2], symbols[3]
         nis = ca.SX(0.0)
         for j in range(self.n_y):  # a gain K tells the variance: 1 - h K = 1 / variance
-            nis += gains[0, j] ** 2 / (1.0 - gains[1, j] * ca.dot(H[j, :].T, gains[2:, j]))
-        return ca.Function("surprise", [gains, H], [nis])
+            h = received[j] * H[j, :].T
+            nis += gains[0, j] ** 2 / (1.0 - ca.dot(h, gains[2:, j]))
+        return ca.Function("surprise", symbols, [nis], {"cse": True})
 
     @cached_property
     def costs(self) -> ca.Function:

@@ -227,9 +227,10 @@ def _linearised(
     states = np.column_stack([point.state for point in points])
     commands = np.column_stack([point.command for point in points])
     found = [block.full() for block in (*model.jacobians(states, commands),)]
-    outputs = model.f(states, commands)[1].full().T
+    # not the rates of the points: what a box holds there is still free in those
+    rates, outputs = (value.full().T for value in model.f(states, commands))
     blocks = zip(*(np.split(block, len(boxes), axis=1) for block in found), strict=True)
-    for each in zip(boxes, points, blocks, outputs, strict=True):
+    for each in zip(boxes, points, blocks, rates, outputs, strict=True):
         yield _mode(model, *each)
 
 
@@ -238,6 +239,7 @@ def _mode(
     box: Box,
     point: OperatingPoint,
     blocks: tuple[np.ndarray, ...],
+    rates: np.ndarray,
     output: np.ndarray,
 ) -> Mode:
     name = " ".join(region.label for region in box.values())
@@ -259,7 +261,7 @@ def _mode(
         state=point.state[kept],
         command=point.command[driven],
         output=output,
-        drift=point.rates[kept],
+        drift=rates[kept],
         scale=model.scale[kept],
     )
 

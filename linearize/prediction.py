@@ -8,6 +8,7 @@ Source: prediction error method, Ljung 1999, "System Identification", Sec. 7.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import casadi as ca
@@ -18,7 +19,7 @@ from linearize.equilibrium import OperatingPoint
 from linearize.holding import whole_point
 from linearize.hybrid_simulation import SampledHybrid, sampled_hybrid
 from linearize.modes import HybridModel, Mode, linearised
-from linearize.visits import Windows
+from linearize.visits import Visited, Windows, joined, windows
 from workbench.called import result
 
 ENOUGH = 1e-5  # of the sum of squares: a step that gains less ends the fit
@@ -46,6 +47,22 @@ def prediction_of(modes: SampledHybrid, windows: Windows) -> PredictionError:
     size = modes.hybrid.model.scale[:, None, None]
     relative = (found - windows.states)[:, 1:] / size
     return PredictionError(np.sqrt(np.mean(relative**2, axis=(1, 2))))
+
+
+def error_along(hybrid: HybridModel, manoeuvres: Sequence[Visited]) -> float:
+    """RMS error of modes over all windows of manoeuvres, each sampled as it was recorded.
+
+    Raises
+    ------
+    ValueError
+        If those of one sample time have no window.
+    """
+    squares, sizes = [], []
+    for clock in dict.fromkeys(each.sample_time_s for each in manoeuvres):
+        judged = windows(joined([each for each in manoeuvres if each.sample_time_s == clock]))
+        squares.append(prediction_of(sampled_hybrid(hybrid, clock), judged).total ** 2)
+        sizes.append(judged.states[:, 1:].size)
+    return float(np.sqrt(np.average(squares, weights=sizes)))
 
 
 def single_of(hybrid: HybridModel, mode: Mode, sample_time_s: float) -> SampledHybrid:

@@ -54,11 +54,15 @@ def validity(
     tolerance: float = TOLERANCE,
     sample_time_s: float = SAMPLE_TIME_S,
 ) -> Validity:
-    """The region of validity of one mode; half-widths are 0 where the point itself is off."""
+    """The region of validity of one mode; half-widths are 0 where the point itself is off.
+
+    Samples are as near to ``sample_time_s`` as a whole number of them in the horizon can be.
+    """
     names = (*mode.state_names, *mode.command_names)
     driven = [hybrid.model.commands.index(name) for name in mode.command_names]
     size = np.concatenate([mode.scale, hybrid.model.command_scale[driven]])
-    samples = round(horizon_s / sample_time_s)
+    samples = max(round(horizon_s / sample_time_s), 1)
+    sample_time_s = horizon_s / samples
     errors_of = partial(_errors, hybrid, mode, samples=samples, sample_time_s=sample_time_s)
     signed = np.concatenate([GROWTH, -GROWTH])
     axes = (signed[:, None, None] * np.diag(size)).transpose(1, 0, 2).reshape(-1, len(size))

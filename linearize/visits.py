@@ -65,7 +65,8 @@ def visited(
     """What ``plant`` visits in its own simulation, which holds all of its states.
 
     The commands of the design model are read off the plant: a command behind its dead zone, or of a
-    solenoid valve the flow through it, which over each sample is the mean of those at its ends.
+    solenoid valve the flow through it, which over each sample is the mean of those at its ends, and
+    at the last one of a piece that at its beginning.
     ``at_stops`` counts what is at an end stop too, for modes that hold it there.
 
     Raises
@@ -78,7 +79,9 @@ def visited(
     p = np.tile(plant.nominal[2][:, None], n)
     behind = result(_commands(model, plant).map(n), x, u, d, p)
     flows = [name.endswith(".flow_kg_s") for name in model.commands]
-    behind[flows, :-1] = 0.5 * (behind[flows, 1:] + behind[flows, :-1])
+    goes_on = np.append(~np.isin(np.arange(1, n), simulated.starts), False)
+    passed = behind[flows]
+    behind[flows] = np.where(goes_on, 0.5 * (np.roll(passed, -1, axis=1) + passed), passed)
     touching = _at_stops(model, plant, simulated)
     free = np.full(n, True) if at_stops else ~touching
     states = simulated.rows(model.states)
@@ -156,8 +159,12 @@ def windows(seen: Visited, horizon_s: float = HORIZON_S, apart_s: float = APART_
     Raises
     ------
     ValueError
-        If there is none.
+        If there is none, or if samples are further apart than the horizon is long.
     """
+    if round(horizon_s / seen.sample_time_s) < 1:
+        raise ValueError(
+            f"no window of {horizon_s:g} s: samples are {seen.sample_time_s:g} s apart"
+        )
     n, apart = round(horizon_s / seen.sample_time_s) + 1, round(apart_s / seen.sample_time_s)
     ends = (*seen.starts[1:], seen.states.shape[1])
     firsts = [

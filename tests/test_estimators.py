@@ -171,6 +171,23 @@ def test_a_measurement_never_makes_a_state_less_certain(name):
 
 
 @everyone
+def test_no_combination_of_states_has_a_variance_below_zero(name):
+    """Of a drive that starts to slide: its bristle goes with the speed, and is not corrected."""
+    plant = servo_drive().lean()
+    estimator, x, u = standard_estimator(name, plant, 2e-3), plant.initial, np.array([5.6])
+    step, (_, d, p) = plant.model.compiled_step(2e-3), plant.nominal
+    estimate, least = estimator.start(x[[0, 2, 4]]), []
+    for _ in range(40):
+        x = step(x, u, d, p).full().ravel()
+        estimate = estimator.update(estimate, u, x[[0, 2, 4]])
+        P = in_scales(estimate, plant)
+        spread = np.sqrt(np.maximum(P.diagonal(), 1e-20))
+        least.append(np.linalg.eigvalsh(P / np.outer(spread, spread)).min())
+
+    assert min(least) > -1e-6
+
+
+@everyone
 def test_an_estimator_gives_the_same_answer_twice(name):
     u, y = cart_data(20)
     first, again = (run(on_cart(name), u, y)[-1] for _ in range(2))

@@ -7,10 +7,11 @@ from linearize.hybrid_simulation import sampled_hybrid
 from linearize.shift_modes import driving_modes
 from linearize.shifting import FLOWS, POSITION, VELOCITY
 from linearize.stopped import has_stops
-from linearize.visits import recorded_visits
+from linearize.visits import joined, recorded_visits, visited
 from studies.gearbox_driving import FRESH, JUDGED_ON, PLACED_ON, driven, manoeuvre
 from studies.truth.gearbox_manoeuvre import training_command
 from workbench.recording import Recording
+from workbench.recording import joined as records_joined
 from workbench.rig import default_rig
 from workbench.simulation import simulate
 
@@ -41,6 +42,20 @@ def test_flows_of_the_valves_are_what_the_modes_are_commanded_with():
     assert mass[:, 1:] - mass[:, :1] == pytest.approx(filled, abs=2e-6)
     assert np.ptp(seen.states[hybrid.model.states.index(POSITION)]) > 5e-3
     assert has_stops(hybrid)
+
+
+def test_no_flow_is_averaged_across_a_gap():
+    """A chamber vents 16 g/s where the first piece ends, and is at rest in the next one."""
+    rig = default_rig("gearbox")
+    model, plant = driving_modes(rig.plant).model, rig.plant.lean()
+    run = simulate(plant, manoeuvre(training_command, 1).part(0, 300))
+    flow = np.abs(visited(model, plant, run).commands).max(axis=0)
+    busy = run.part(0, int(flow[:200].argmax()) + 1)
+    pieces = records_joined([busy, run.part(0, 20)])
+    apart = joined([visited(model, plant, piece) for piece in pieces.pieces])
+
+    assert flow.max() > 1e-3
+    assert np.array_equal(visited(model, plant, pieces).commands, apart.commands)
 
 
 def test_the_main_piston_shares_its_momentum_with_the_floating_one_that_it_picks_up():

@@ -73,11 +73,22 @@ def on_drive(**more):
     process = {"slide.velocity_m_s": 0.1, **dict.fromkeys(OUTPUTS[1:], 1e3)}
     return InteractingModels(
         plant=servo_drive().lean(),
-        sample_time_s=1e-3,
         measurement_noise=noise,
         process_noise=process,
-        **more,
+        **{"sample_time_s": 1e-3} | more,
     )
+
+
+@pytest.mark.parametrize("sample_time_s", [1e-3, 0.05, 0.4])
+def test_switches_are_those_of_a_markov_process_in_time_at_every_sample_time(sample_time_s):
+    """A regime is left once in 50 ms on the mean, for either of the others, and may come back."""
+    from scipy.linalg import expm
+
+    leaving = (np.full((3, 3), 0.5) - 1.5 * np.eye(3)) / 0.05
+    found = on_drive(sample_time_s=sample_time_s).transition
+
+    assert found == pytest.approx(expm(leaving * sample_time_s), rel=1e-9)
+    assert (found.diagonal() >= found.max(axis=1) - 1e-12).all()
 
 
 def test_odds_stay_right_where_likelihoods_are_no_numbers():

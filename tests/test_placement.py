@@ -9,7 +9,7 @@ from manoeuvres import gone_through
 
 from linearize.hybrid_simulation import sampled_hybrid
 from linearize.placement import growing_modes, placed_modes
-from linearize.prediction import fitted_single, prediction_of, single_of
+from linearize.prediction import error_along, fitted_single, prediction_of, single_of
 from linearize.standard import COMMAND, POSITION, VELOCITY, standard_modes
 from linearize.visits import joined, windows
 from workbench.plants.servo_drive import STROKE_M, servo_drive
@@ -73,6 +73,22 @@ def test_windows_do_not_reach_across_a_gap(seen):
 def test_a_manoeuvre_shorter_than_the_horizon_is_an_error(seen):
     with pytest.raises(ValueError, match=r"no window of 20 s in free motion"):
         windows(seen, horizon_s=20.0)
+
+
+def test_manoeuvres_of_several_sample_times_are_each_judged_at_their_own(hybrid):
+    fine = gone_through("validation")
+    rows = {name: getattr(fine, name)[..., ::5] for name in ("states", "commands", "free")}
+    coarse = replace(fine, sample_time_s=5e-3, touching=fine.touching[::5], **rows)
+    alone = [error_along(hybrid, [each]) for each in (fine, coarse)]
+    both = error_along(hybrid, [fine, coarse, fine])
+
+    assert both == pytest.approx(error_along(hybrid, [coarse, fine, fine]))
+    assert min(alone) <= both <= max(alone)
+
+
+def test_a_horizon_shorter_than_a_sample_is_an_error(seen):
+    with pytest.raises(ValueError, match=r"no window of 0\.05 s: samples are 0\.2 s apart"):
+        windows(replace(seen, sample_time_s=0.2))
 
 
 def test_placed_modes_err_a_third_of_the_best_single_linear_model_over_50_ms(

@@ -8,14 +8,16 @@ import pytest
 from scipy.linalg import expm
 
 from workbench.comparison.horizons import beside_measured
-from workbench.filter_passes import posed, recording_filter
-from workbench.filtering import consistent_start
+from workbench.filter_passes import posed, recording_filter, smooth
+from workbench.filtering import consistent_start, smoothed, smoothed_covariances
 from workbench.plant_filter import transition
 from workbench.plants.gearbox import gearbox
 from workbench.plants.servo_drive import COMMAND, OUTPUTS, servo_drive
 from workbench.recording import Recording
+from workbench.simulation import simulate
 
 DT_S = 0.02
+VELOCITY = "slide.velocity_m_s"
 
 
 def test_a_start_keeps_the_gas_at_its_temperature():
@@ -68,6 +70,70 @@ def test_what_is_considered_is_not_corrected_but_its_uncertainty_counts():
     np.testing.assert_array_equal(kept[0].full().ravel()[rows], start[rows])
     np.testing.assert_allclose(kept[1].full()[rows, rows], P[rows, rows])
     np.testing.assert_allclose(free[2].full(), kept[2].full())
+
+
+def held_back(mask, N=7, seed=0):
+    """A filter of a drawn linear system whose gains are those of ``mask``: what it tells by sample.
+
+    Returns H, S and the arguments of :func:`smoothed_covariances`.
+    """
+    rng, n, n_y = np.random.default_rng(seed), 3, 2
+    F, H = 0.6 * rng.standard_normal((N, n, n)), rng.standard_normal((N, n_y, n))
+    H[3] = 0.0  # nothing received
+    ahead, Q, told = np.eye(n), np.diag([0.1, 0.2, 0.05]), []
+    for k in range(N):
+        S = H[k] @ ahead @ H[k].T + np.eye(n_y)
+        seen = np.linalg.solve(S, H[k]).T
+        K = mask[:, None] * (ahead @ seen)
+        left = np.eye(n) - K @ H[k]
+        P = left @ ahead @ left.T + K @ K.T
+        told.append((S, P, seen @ H[k], left, np.hstack([K, seen])))
+        ahead = F[k] @ (P + Q / 2) @ F[k].T + Q / 2
+    S, P, weights, left, gains = map(np.array, zip(*told, strict=True))
+    return H, S, (P, F, weights, left, gains, Q)
+
+
+def smoothed_errors(H, S, known, drawn):
+    """What the smoother misses, (N, n), where the noise is ``drawn``: start, then by sample."""
+    P, F, weights, left, gains, Q = known
+    N, n = len(P), len(Q)
+    kick, v = np.split(drawn[n:].reshape(N, -1), [2 * n], axis=1)
+    kick = kick * np.tile(np.sqrt(Q.diagonal() / 2), 2)
+    x, ahead, true, filtered, said = drawn[:n], np.zeros(n), [], [], []
+    for k in range(N):
+        e = (H[k] @ (x - ahead) + v[k]) * H[k].any()
+        true.append(x)
+        filtered.append(ahead + gains[k, :, :2] @ e)
+        said.append(H[k].T @ np.linalg.solve(S[k], e))
+        x = F[k] @ (x + kick[k, :n]) + kick[k, n:]
+        ahead = F[k] @ filtered[k]
+    return smoothed(np.array(filtered), P, F, np.array(said), weights, left)[0] - true
+
+
+@pytest.mark.parametrize("mask", [(1.0, 1.0, 1.0), (1.0, 1.0, 0.0)])
+def test_smoothed_covariances_are_those_of_the_errors_whatever_the_gain(mask):
+    """Errors are linear in the noise: the sum over every single one of it is the covariance."""
+    H, S, known = held_back(np.array(mask))
+    every = [smoothed_errors(H, S, known, drawn) for drawn in np.eye(3 + 7 * 8)]
+    true = sum(np.einsum("ki,kj->kij", error, error) for error in every)
+
+    np.testing.assert_allclose(smoothed_covariances(*known), true, rtol=0.0, atol=1e-12)
+
+
+def test_a_smoothed_state_beside_a_bristle_is_never_certain():
+    """Its gain is 0, and what holds behind the best gain made variances that were below zero."""
+    plant, n = servo_drive().lean(), 400
+    command = 4.95 + 0.8 * np.sin(2.0 * np.pi * 5.0 * 1e-3 * np.arange(n))
+    noise = dict(zip(OUTPUTS, (5e-6, 500.0, 500.0), strict=True))
+    run, rng = simulate(plant, Recording("run", 1e-3, {COMMAND: command})), np.random.default_rng(0)
+    seen = {name: run[name] + size * rng.standard_normal(n) for name, size in noise.items()}
+    recording = Recording("run", 1e-3, {COMMAND: command, **seen}, noise=noise)
+    gas = dict.fromkeys(OUTPUTS[1:], 1e3)
+    walking = recording_filter(plant, recording, {VELOCITY: 5.0}, process_noise=gas)
+    found = smooth(walking, recording)
+    off = found.unknown[0] / np.maximum(found.unknown_deviation[0], 1e-9)
+
+    assert np.square(off).mean() < 2.0
 
 
 def test_what_no_state_of_is_measured_stands_beside():

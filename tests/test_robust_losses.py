@@ -7,6 +7,8 @@ from horizons import cart_data, on_cart, run
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from estimators.foreseen import Foresight
+from estimators.gated import Gated
 from estimators.losses import Absolute, Huber, Squared
 from estimators.nearest_inside import nearest_inside
 
@@ -54,6 +56,21 @@ def test_outliers_hardly_move_a_robust_estimate():
 
     assert moved[Huber()].max() < 0.15 * moved[Squared()].max()
     assert moved[Absolute()].max() < 0.15 * moved[Squared()].max()
+
+
+@pytest.mark.parametrize("loss", [Squared(), Huber(), Absolute()])
+def test_an_outlier_is_as_surprising_as_it_is_whatever_it_costs(loss):
+    """A gate before an estimator that lets go of outliers by itself must see them, too."""
+    u, y = cart_data(45)
+    y[40] += 0.02
+    estimator = on_cart(horizon=4, loss=loss)
+    found, sight = run(estimator, u, y), Foresight(estimator)
+    expected, S = sight.outputs(sight.blind(found[39], u[39]), u[39])
+    gated = run(Gated(inner=estimator), u, y)
+
+    assert found[40].notes["nis"] == pytest.approx(((y[40] - expected) ** 2 / S)[0, 0], rel=1e-4)
+    assert found[40].notes["nis"] > 80.0
+    assert [k for k, each in enumerate(gated) if each.notes["outliers"]] == [40]
 
 
 @pytest.mark.parametrize("loss", [Huber, Absolute])

@@ -7,6 +7,7 @@ from linearize.analysis import analyse
 from linearize.axes import joint_axes, rig_axis
 from linearize.hybrid_simulation import sampled_hybrid
 from linearize.leg_modes import leg_placing
+from linearize.modes import hybrid_modes
 from linearize.reduction import closed_command, design_model
 from linearize.regimes import flow_regimes
 from linearize.rest import rest_of
@@ -147,6 +148,25 @@ def test_a_joint_that_sticks_takes_up_what_the_others_do_to_it():
 
     assert slope(held) / slope(free) == pytest.approx(1.0 / M[1, 1] / np.linalg.inv(M)[1, 1])
     assert "joint_2.velocity_rad_s" not in held.state_names
+
+
+def test_the_drift_of_a_joint_is_that_beside_the_joint_that_is_held():
+    """Where the pressures carry nothing: M33 a3' = M32 a2 + M33 a3 with joint 2 at rest."""
+    plant = PLANTS["crr_leg"]()
+    legs = standard_modes(plant).model
+    _, axis, _ = joint_axes(plant)
+    cut = {axis.velocity: axis.friction_cut()}
+    held = hybrid_modes(plant, cut, model=legs)["2 stick"]
+    x, u = legs.initial, legs.plant.nominal[0]
+    a = dict(zip(legs.states, legs.f(x, u)[0].full().ravel(), strict=True))
+    leg = next(part for part in legs.plant.parts if part.name == "leg")
+    q = np.array([x[legs.states.index(f"joint_{k}.angle_rad")] for k in (1, 2, 3)])
+    M32, M33 = (float(leg.mass_matrix(q)[2, k]) for k in (1, 2))
+    row = held.state_names.index("joint_3.velocity_rad_s")
+    reaction = M32 / M33 * a["joint_2.velocity_rad_s"]
+
+    assert abs(reaction) > 1.0
+    assert held.drift[row] == pytest.approx(a["joint_3.velocity_rad_s"] + reaction)
 
 
 def test_each_joint_breaks_away_by_itself():

@@ -50,6 +50,17 @@ def test_inside_of_its_region_a_mode_predicts_within_the_tolerance(hybrid, found
         assert worst_error(hybrid, hybrid[SLIDES], moved) < TOLERANCE
 
 
+@pytest.mark.parametrize("horizon_s", [4e-4, 1.4e-3])
+def test_a_horizon_of_no_whole_number_of_samples_is_kept(hybrid, horizon_s):
+    """Shorter than half a sample, too, or up to 40 % longer than one."""
+    mode = hybrid[SLIDES]
+    found = validity(hybrid, mode, horizon_s)
+    divided = validity(hybrid, mode, horizon_s, sample_time_s=horizon_s)
+
+    assert found.horizon_s == horizon_s
+    assert found == divided
+
+
 def test_one_step_beyond_it_does_not(hybrid, found):
     one_more = 1.01 * GROWTH[1] / GROWTH[0]
     for k, half in enumerate(found.alone.values()):

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from workbench.called import called
-from workbench.filtering import consistent_start, smoothed
+from workbench.filtering import consistent_start, smoothed, smoothed_covariances
 from workbench.plant import Plant
 from workbench.plant_filter import PlantFilter
 from workbench.recording import Recording
@@ -72,7 +72,8 @@ def smooth(found: PlantFilter, recording: Recording, factor: float = 1.0) -> Fil
 
     ``factor`` multiplies the intensities of the unknown inputs.
     """
-    return _joined(found, [_smoothed(_run(found, p, factor=factor)) for p in recording.pieces])
+    passes = (_run(found, piece, factor=factor) for piece in recording.pieces)
+    return _joined(found, [_smoothed(found, one) for one in passes])
 
 
 def blocks(
@@ -132,6 +133,8 @@ class _Pass:
     said: np.ndarray
     weights: np.ndarray
     left: np.ndarray
+    gains: np.ndarray
+    Q: np.ndarray
     innovations: np.ndarray
     deviation: np.ndarray
     log_likelihood: float
@@ -173,7 +176,7 @@ def _run(
         start[: len(guessed)] = guessed / found.plant.scale
     received = columns[-1]
     rows = zip(*_passed(found, start, P0, Q, columns), strict=True)
-    F, X, P, e, deviation, likely, said, weights, left = map(np.hstack, rows)
+    F, X, P, e, deviation, likely, said, weights, left, gains = map(np.hstack, rows)
     return _Pass(
         X=X.T,
         P=_stacked(P),
@@ -181,6 +184,8 @@ def _run(
         said=said.T,
         weights=_stacked(weights),
         left=_stacked(left),
+        gains=_apart(gains, 2 * len(found.plant.measured)),
+        Q=Q,
         innovations=np.where(received, e, np.nan),
         deviation=deviation,
         log_likelihood=float(likely.sum()),
@@ -215,12 +220,19 @@ def _filled(columns: np.ndarray, samples: int) -> np.ndarray:
 
 def _stacked(wide: np.ndarray) -> np.ndarray:
     """Square matrices that stand side by side, as an array (n, size, size)."""
-    size = wide.shape[0]
-    return wide.reshape(size, -1, size).transpose(1, 0, 2)
+    return _apart(wide, wide.shape[0])
 
 
-def _smoothed(one: _Pass) -> _Pass:
+def _apart(wide: np.ndarray, width: int) -> np.ndarray:
+    """Matrices of so many columns that stand side by side, as an array (n, rows, width)."""
+    return wide.reshape(wide.shape[0], -1, width).transpose(1, 0, 2)
+
+
+def _smoothed(found: PlantFilter, one: _Pass) -> _Pass:
     X, P = smoothed(one.X, one.P, one.F, one.said, one.weights, one.left)
+    if not found.corrected.all():
+        known = (one.P, one.F, one.weights, one.left, one.gains, one.Q)
+        P = smoothed_covariances(*known)
     return replace(one, X=X, P=P)
 
 

@@ -57,6 +57,8 @@ def smoothed(
     ``F[k]`` leads from sample k to k + 1; ``said`` = H' S^-1 e, ``weights`` = H' S^-1 H and
     ``left`` = I - K H belong to the measurement of sample k.
 
+    The covariances hold behind the best gain; :func:`smoothed_covariances` gives those of others.
+
     Source: Bierman 1973, "Fixed interval smoothing with discrete measurements".
     """
     smooth, P = states.copy(), covariances.copy()
@@ -68,6 +70,41 @@ def smoothed(
             adjoint = F[k - 1].T @ (said[k] + left[k].T @ adjoint)
             information = F[k - 1].T @ (weights[k] + left[k].T @ information @ left[k]) @ F[k - 1]
     return smooth, P
+
+
+def smoothed_covariances(
+    covariances: np.ndarray,
+    F: np.ndarray,
+    weights: np.ndarray,
+    left: np.ndarray,
+    gains: np.ndarray,
+    Q: np.ndarray,
+) -> np.ndarray:
+    """Covariances (n, n_x, n_x) of the states of :func:`smoothed` behind any gain.
+
+    A state that no measurement corrects, as a bristle, has a gain of 0, which is not the best one:
+    innovations are then not white, and P - P I P may come out below zero.  With the error e that
+    the filter leaves at a sample, the adjoint is I e + n, n from the noise of later samples, and
+
+        (1 - P I) P (1 - P I)' + P N P,     N the covariance of n.
+
+    ``gains`` = [K, H' S^-1], (n, n_x, 2 n_y), in units of the noise of the outputs; ``Q`` is what
+    a state gains in a step, half of it before.
+    """
+    unit, (n_x, columns) = np.eye(len(Q)), gains.shape[1:]
+    information, N, found = np.zeros((n_x, n_x)), np.zeros((n_x, n_x)), []
+    for k in range(len(covariances) - 1, -1, -1):
+        P = covariances[k]
+        rest = unit - P @ information
+        found.append(rest @ P @ rest.T + P @ N @ P)
+        if k:
+            K, seen = np.split(gains[k], [columns // 2], axis=1)
+            step, told = F[k - 1], weights[k] + left[k].T @ information @ left[k]
+            read = seen - left[k].T @ information @ K
+            gained = step @ (Q / 2.0) @ step.T + Q / 2.0
+            N = told @ gained @ told.T + read @ read.T + left[k].T @ N @ left[k]
+            N, information = step.T @ N @ step, step.T @ told @ step
+    return np.array(found[::-1])
 
 
 def consistent_start(plant: Plant, known: Mapping[str, float]) -> np.ndarray:

@@ -1,9 +1,9 @@
 """An extended Kalman filter on a plant, one sample as one CasADi function.
 
-Chosen state rates may carry an unknown input, and chosen parameters may wander, both modelled as
-random walks:
+Chosen state rates may carry an unknown input, chosen parameters may wander, both as random walks:
 
     dx/dt = f(x, u, d, p + S w) + E w + process noise,     dw/dt = noise of the given intensity
+    y = h(x, u, d, p + S w) + measurement noise
 
 The transition matrix is not differentiated through the integrator.  It is the stability function
 of Radau IIA of order 3 at a quarter of the step, squared twice: L-stable, so that a bristle at
@@ -154,11 +154,11 @@ class PlantFilter:
 
     @cached_property
     def correct(self) -> ca.Function:
-        """(X, P, u, d, p, y, received) -> (X, P, innovation, deviation, log-likelihood, i, J, L).
+        """(X, P, u, d, p, y, received) -> (X, P, innovation, spread, log-likelihood, i, J, L, G).
 
-        i = H' S^-1 e and J = H' S^-1 H are what the measurement says, L = I - K H what it leaves.
-
-        ``received`` is 1 or 0 by output; a missing value of y may hold any finite number.
+        i = H' S^-1 e and J = H' S^-1 H are what the measurement says, L = I - K H what it leaves;
+        G = [K, H' S^-1], with outputs in units of their noise.  ``received`` is 1 or 0 by output;
+        a missing value of y may hold any finite number.
         """
         told = self.correct_with_nis
         symbols = [ca.MX.sym(f"i{i}", *told.size_in(i)) for i in range(told.n_in())]
@@ -173,10 +173,10 @@ class PlantFilter:
         u, d, p = (ca.MX.sym(k, s.numel()) for k, s in zip("udp", model.symbols[1:], strict=True))
         y, received = ca.MX.sym("y", n_y), ca.MX.sym("received", n_y)
         r = np.array([self.measurement_noise[name] for name in model.measured])
-        x = self.scale[:n] * X[:n]
-        expected, C = self._outputs(x, u, d, p)
-        C = C * np.outer(1 / r, self.scale[:n])  # outputs in units of their noise
-        H = ca.horzcat(C, ca.MX(n_y, size - n)) * ca.repmat(received, 1, size)
+        real = self.scale * X
+        expected, C = self.outputs(real[:n], real[n:, 0], u, d, p)
+        C = C * np.outer(1 / r, self.scale)  # outputs in units of their noise
+        H = C * ca.repmat(received, 1, size)
         e = received * (y - expected) / r
         S = H @ P @ H.T + ca.MX.eye(n_y)
         K = self.corrected[:, None] * ca.solve(S, H @ P).T
@@ -185,7 +185,8 @@ class PlantFilter:
         nis = e.T @ ca.solve(S, e)
         likely = -0.5 * (nis + ca.log(ca.det(S)) + ca.dot(received, np.log(2 * np.pi * r**2)))
         results = [X + K @ e, rest @ P @ rest.T + K @ K.T, e * r, ca.sqrt(ca.diag(S)) * r, likely]
-        results += [H.T @ weighted[:, 0], H.T @ weighted[:, 1:], rest, nis]
+        results += [H.T @ weighted[:, 0], H.T @ weighted[:, 1:], rest]
+        results += [ca.horzcat(K, weighted[:, 1:].T), nis]
         return ca.Function("correct", [X, P, u, d, p, y, received], results)
 
     @cached_property
@@ -226,11 +227,12 @@ class PlantFilter:
         return ca.Function("likelihood", [packed, *inputs], [once(*unpacked, *inputs)])
 
     @cached_property
-    def _outputs(self) -> ca.Function:
-        """(x, u, d, p) -> (y, dy/dx)."""
-        model = self.plant.model
-        slope = ca.jacobian(model.outputs, model.symbols[0])
-        return ca.Function("outputs", [*model.symbols], [model.outputs, slope])
+    def outputs(self) -> ca.Function:
+        """(x, w, u, d, p) -> (y, dy/d(x, w))."""
+        x, u, d, p = self.plant.model.symbols
+        w = ca.SX.sym("w", len(self.unknown_inputs))
+        y = ca.substitute(self.plant.model.outputs, p, p + ca.DM(self._wandering) @ w)
+        return ca.Function("outputs", [x, w, u, d, p], [y, ca.jacobian(y, ca.vertcat(x, w))])
 
     @property
     def _entering(self) -> np.ndarray:

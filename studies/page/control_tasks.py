@@ -8,11 +8,10 @@ from pathlib import Path
 
 from controllers.design_file import design, write_design
 from linearize.cuts import Interval
-from linearize.hybrid_simulation import sampled_hybrid
 from linearize.modes import HybridModel
-from linearize.prediction import prediction_of
+from linearize.prediction import error_along
 from linearize.stopped import has_stops
-from linearize.visits import joined, recorded_visits, windows
+from linearize.visits import recorded_visits
 from studies.checking import Checked, loops_of, recorded_runs, styled_figures
 from studies.design_numbers import design_numbers
 from studies.design_report import design_report
@@ -103,8 +102,7 @@ def _error(rig: Rig, hybrid: HybridModel, recordings: Sequence[Recording], say: 
         recorded_visits(rig, hybrid.model, each, has_stops(hybrid), per_sample)
         for each in recordings
     ]
-    judged = windows(joined(seen))
-    return prediction_of(sampled_hybrid(hybrid, judged.sample_time_s), judged).total
+    return error_along(hybrid, seen)
 
 
 def close_loops(
