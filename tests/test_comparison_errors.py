@@ -48,6 +48,14 @@ def test_the_worst_stretches_reach_the_end_and_over_no_gap():
     )
 
 
+def test_a_stretch_with_next_to_no_error_is_none_of_the_worst():
+    squared = np.repeat([1.0, 1e-3, 0.0], 200)
+    recording = Recording("three windows", 1e-3, {PRESSURE: squared})
+
+    (span,) = _worst(squared, recording, 0.2)
+    assert (span.start_s, span.end_s) == (0.0, 0.2)
+
+
 def test_what_fails_in_the_windows_is_not_taken_for_a_short_recording(monkeypatch):
     def broken(*_):
         raise ValueError("a bug")

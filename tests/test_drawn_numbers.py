@@ -63,6 +63,8 @@ def test_an_estimate_that_is_off_for_one_sample_of_a_long_run_is_drawn():
     time_s, error_mm = axes.lines[0].get_data()
     assert error_mm.max() == pytest.approx(5.0)
     assert time_s[error_mm.argmax()] == pytest.approx(1.2345)
+    assert error_mm.max() > axes.get_ylim()[1]
+    assert [each.get_text() for each in axes.texts] == ["up to 5"]
 
 
 def decay():

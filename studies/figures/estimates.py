@@ -42,21 +42,18 @@ def band_figure(
         figure = new_figure(PAGE_IN, 0.6 + 1.3 * len(truth))
         grid = figure.subplots(len(truth), len(runs), squeeze=False, sharex=True, sharey="row")
         for axes_row, (name, true) in zip(grid, truth.items(), strict=True):
+            there = [run for run in runs.values() if name in run.names]
             for axes, run in zip(axes_row, runs.values(), strict=True):
                 if name in run.names:
                     _band(axes, run, name, true, sample_time_s)
             widest = [
-                np.percentile(2.0 * run.deviation(name)[len(true) // 10 :], 98)
-                for run in runs.values()
-                if name in run.names
+                np.percentile(2.0 * run.deviation(name)[len(true) // 10 :], 98) for run in there
             ]
-            off = [
-                np.percentile(np.abs(run.state(name) - true), 98)
-                for run in runs.values()
-                if name in run.names
-            ]
+            off = [np.percentile(np.abs(run.state(name) - true), 98) for run in there]
             limit = BEYOND * display_scale(name).factor ** -1 * max(*widest, *off)
             axes_row[0].set_ylim(-limit, limit)
+            for axes in axes_row:
+                _told_beyond(axes, limit)
             words = public_name(name).replace(".", "\n").replace("_", " ")
             axes_row[0].set_ylabel(f"{words}\nerror ({display_unit(name)})")
         for axes, label in zip(grid[0], runs, strict=True):
@@ -80,6 +77,15 @@ def _band(axes: Axes, run: Followed, name: str, true: np.ndarray, sample_time_s:
         label="two standard deviations",
     )  # fmt: skip
     axes.plot(time_s, error, color=BLUE, linestyle="-", linewidth=0.7, label="estimate less truth")
+
+
+def _told_beyond(axes: Axes, limit: float) -> None:
+    """Says of the largest error that is cut off how large it is."""
+    errors = [np.abs(np.asarray(line.get_ydata())) for line in axes.lines]
+    largest = max((float(np.nanmax(each)) for each in errors), default=0.0)
+    if largest > limit:
+        where = {"transform": axes.transAxes, "ha": "right", "va": "top", "fontsize": 6}
+        axes.text(0.99, 0.96, f"up to {largest:.3g}", **where)
 
 
 def _shown(each: EstimatedRecording) -> list[str]:

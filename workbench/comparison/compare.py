@@ -42,6 +42,7 @@ from workbench.rig import Rig
 __all__ = ["FREE_RUN", "ONE_STEP", "PLAIN", "WINDOW", "compare", "signal_error"]
 
 WORST = 3  # windows that are marked
+LEAST_SHARE = 0.01  # of the squared error: a window with less is not marked
 
 
 @dataclass(frozen=True)
@@ -229,7 +230,10 @@ def _begin_in_words(recording: Recording) -> tuple[str, ...]:
 
 
 def _worst(squared: np.ndarray, recording: Recording, window_s: float) -> tuple[Span, ...]:
-    """The stretches with the largest error, as long as a window or to the end of their piece."""
+    """The stretches with the largest error, as long as a window or to the end of their piece.
+
+    One that holds next to none of the error is none of the worst, however few there are.
+    """
     dt = recording.sample_time_s
     length = max(round(window_s / dt), 1)
     total = float(np.nansum(squared))
@@ -242,5 +246,5 @@ def _worst(squared: np.ndarray, recording: Recording, window_s: float) -> tuple[
     return tuple(
         Span(first * dt, last * dt, found / total)
         for found, first, last in sorted(sums, reverse=True)[:WORST]
-        if found > 0
+        if found > LEAST_SHARE * total
     )
