@@ -84,8 +84,8 @@ def _told_beyond(axes: Axes, limit: float) -> None:
     errors = [np.abs(np.asarray(line.get_ydata())) for line in axes.lines]
     largest = max((float(np.nanmax(each)) for each in errors), default=0.0)
     if largest > limit:
-        where = {"transform": axes.transAxes, "ha": "right", "va": "top", "fontsize": 6}
-        axes.text(0.99, 0.96, f"up to {largest:.3g}", **where)
+        where = {"transform": axes.transAxes, "ha": "right", "va": "bottom", "fontsize": 6}
+        axes.text(1.0, 1.01, f"up to {largest:.3g}", **where)
 
 
 def _shown(each: EstimatedRecording) -> list[str]:
