@@ -106,6 +106,8 @@ class UnscentedKalman(StochasticPlant):
         and what P holds of both would outgrow the variances.
         """
         free, rest = self._free, np.setdiff1d(np.arange(len(P)), self._free)
+        if not len(rest):
+            return off
         known = np.linalg.pinv(P[np.ix_(free, free)], hermitian=True)
         off[:, rest] = off[:, free] @ known @ P[np.ix_(free, rest)]
         return off
