@@ -24,6 +24,7 @@ from controllers.axis import Axis
 from controllers.margins import Law, both_ways_s, unforeseen_s
 from controllers.on_measurement import OnMeasurement
 from controllers.scheduled import Schedule, with_modes
+from controllers.spool import spool_lag_s
 from linearize.discrete import sampled
 from linearize.modes import HybridModel, Mode
 from workbench.contracts import Controller
@@ -35,11 +36,16 @@ SLACK = 1e-6  # of a sample, as of the estimators
 
 @dataclass(frozen=True)
 class Delays:
-    """What is late in a loop: sensors, commands, and whether an estimator foresees the latter."""
+    """What is late in a loop: sensors, commands, and whether an estimator foresees the latter.
+
+    ``spool_s`` is the time constant of the valve's spool, as it is led where an estimator tells of
+    it (:mod:`controllers.spool`).
+    """
 
     sensors_s: float
     commands_s: float
     foreseen: bool
+    spool_s: float = 0.0
 
     @property
     def both_s(self) -> float:
@@ -54,8 +60,9 @@ class Delays:
 
 def delays_of(plant: Plant, law: Controller) -> Delays:
     """Those that a law is designed for: one on the measurement itself meets all of both."""
-    sensors_s = unforeseen_s(plant)
-    return Delays(sensors_s, both_ways_s(plant) - sensors_s, not isinstance(law, OnMeasurement))
+    sensors_s, foreseen = unforeseen_s(plant), not isinstance(law, OnMeasurement)
+    spool_s = spool_lag_s(plant, foreseen, getattr(law, "axis", None))
+    return Delays(sensors_s, both_ways_s(plant) - sensors_s, foreseen, spool_s)
 
 
 def foreseeing(

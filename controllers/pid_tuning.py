@@ -5,11 +5,11 @@ tied to K_p by the integral time these are two linear equations for K_p and K_d,
 
     K_p (1 + I(w) / T_i) + K_d H(w) = exp(j (margin - pi)) / G(w)
 
-where G is the sampled mode with its delays, I the summation and H the derivative filter as they are
-run.  Where they ask for a negative K_d the phase suffices without, and K_d is zero.  Where the loop
-is unstable or bears too little gain, no PID of that bandwidth is right, and the answer names the
-nearest that is right on all modes.  A lightly damped spring leaves a gap: below it the crossover is
-slow and needs no derivative, above it is fast and lives by it.
+where G is the sampled mode with its delays and the lag of its spool, I the summation and H the
+derivative filter as they are run.  Where they ask for a negative K_d the phase suffices without,
+and K_d is zero.  Where the loop is unstable or bears too little gain, no PID of that bandwidth is
+right, and the answer names the nearest that is right on all modes.  A lightly damped spring leaves
+a gap: below it the crossover is slow and needs no derivative, above it is fast and lives by it.
 
 Source: K. J. Astrom and T. Hagglund, "Advanced PID Control", ISA 2006 (one point of the Nyquist
 curve); overshoot to phase margin by the second-order loop w^2 / (s (s + 2 z w)).
@@ -29,6 +29,7 @@ from controllers.margins import Law, Margins, both_ways_s, closed, loop, margins
 from controllers.motion import MotionLimits, sliding_on
 from controllers.scheduled import Schedule, constant, driven_modes, scheduled
 from controllers.spec import ranged
+from controllers.spool import behind_spool, spool_lag_s
 from controllers.through_valve import through_valve
 from controllers.two_degree_pid import Dither, Feedforward, PidGains, TwoDegreePid, law_of
 from linearize.modes import HybridModel, Mode
@@ -104,7 +105,7 @@ def margin_of_overshoot(overshoot: float) -> float:
 def tuned_pid(
     hybrid: HybridModel, spec: TuningSpec | None = None, parts: PidParts | None = None
 ) -> TwoDegreePid:
-    """A PID with the gains of each mode from one specification, at the plant's own delays.
+    """A PID with the gains of each mode from one specification, at the plant's delays and lag.
 
     Raises
     ------
@@ -113,8 +114,9 @@ def tuned_pid(
     """
     spec, parts = spec or TuningSpec(), parts or PidParts()
     delay_s = both_ways_s(hybrid.plant)
-    modes = tuple(mode for side in driven_modes(hybrid) for mode in side)
-    gains = scheduled(hybrid, lambda mode: tuned_gains(mode, spec, parts, delay_s, modes))
+    lagging = behind_spool(hybrid, spool_lag_s(hybrid.plant, told=False))
+    modes = tuple(mode for side in driven_modes(lagging) for mode in side)
+    gains = scheduled(lagging, lambda mode: tuned_gains(mode, spec, parts, delay_s, modes))
     return pid_with(hybrid, gains, parts)
 
 
@@ -187,8 +189,9 @@ def _allowed(
 
 def pid_margins(mode: Mode, gains: PidGains, parts: PidParts, delay_s: float) -> Margins:
     """The margins of known gains on a mode, with the delays in the loop."""
-    law = law_of(gains, parts.derivative.filter(parts.sample_time_s), parts.sample_time_s)
-    return margins_of(mode, law, parts.sample_time_s, delay_s)
+    dt = parts.sample_time_s
+    law = law_of(gains, parts.derivative.filter(dt), dt, len(mode.state_names))
+    return margins_of(mode, law, dt, delay_s)
 
 
 def _at_bandwidth(
@@ -208,7 +211,7 @@ def _at_bandwidth(
         kp, kd = abs(wanted) / abs(summed), 0.0
     shares = {"setpoint": parts.setpoint, "setpoint_rate": parts.setpoint_rate}
     gains = PidGains(proportional=kp, integral=kp / integral_time_s, derivative=kd, **shares)
-    law = law_of(gains, (A, B, C, D), dt)
+    law = law_of(gains, (A, B, C, D), dt, len(mode.state_names))
     if kp < 0.0 or np.abs(np.linalg.eigvals(closed(mode, law, dt, delay_s))).max() >= 1.0:
         return None
     found = margins_of(mode, law, dt, delay_s)
@@ -218,6 +221,7 @@ def _at_bandwidth(
 
 def _plant_at(mode: Mode, z: complex, sample_time_s: float, delay_s: float) -> complex:
     """From the opening to the position, at one point of the plane of z."""
-    seen = Law(np.zeros((0, 0)), np.zeros((0, 4)), np.zeros(0), np.array([-1.0, 0.0, 0.0, 0.0]))
+    n = len(mode.state_names)
+    seen = Law(np.zeros((0, 0)), np.zeros((0, n)), np.zeros(0), -np.eye(n)[0])
     A, B, C = loop(mode, seen, sample_time_s, delay_s)
     return complex((C @ np.linalg.solve(z * np.eye(len(A)) - A, B))[0, 0])

@@ -71,6 +71,16 @@ class ThroughValve:
         jump_v = (through_v - wanted_v) * tanh(abs(opening_v) / self.smooth_v)
         return np.array([min(max(wanted_v + jump_v, self.lower_v), self.upper_v)])
 
+    def lag_s(self, told: bool) -> float:
+        """Time constant that :meth:`sent` leaves between a wanted opening and the spool's.
+
+        ``told``: whether an estimator tells of the spool.
+        """
+        if self.lag is None:
+            return 0.0
+        constant_s = float(self.lag.time_constant_s)
+        return min(constant_s, LED_S) if told else constant_s
+
     @cached_property
     def _undone(self) -> Curve:
         """Wanted opening behind the dead zone -> what goes in before it."""

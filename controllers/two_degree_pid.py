@@ -215,13 +215,13 @@ def mixed(schedule: Schedule[PidGains], place: float, ahead: float) -> PidGains:
     return PidGains(**{key: float(sum(w * getattr(g, key) for w, g in here)) for key in names})
 
 
-def law_of(gains: PidGains, slopes: Filter, sample_time_s: float) -> Law:
-    """From the states of an axis, position first, to the opening; its memory ends with I / K_i.
+def law_of(gains: PidGains, slopes: Filter, sample_time_s: float, states: int = 4) -> Law:
+    """From so many states of an axis, position first, to the opening; its memory ends with I / K_i.
 
     Without an integral gain it has none: it would stand as a pole at one that nothing sees.
     """
     A, B, C, D = slopes
-    place = np.array([1.0, 0.0, 0.0, 0.0])
+    place = np.eye(states)[0]
     kept, moved, seen = A, np.outer(B, place), gains.derivative * C
     if gains.integral:
         n = len(A)

@@ -268,7 +268,7 @@ def _left_out(plant: Plant) -> Iterator[LeftOut]:
             )
         elif isinstance(member, ValveLag):
             yield LeftOut(
-                member.name, "no lag", "inside the dead zone's undoing; margins must hold it"
+                member.name, "no lag", "no law reads the spool; margins have its lag in the loop"
             )
         elif isinstance(member, HeatedWall):
             yield LeftOut(f"{member.name} warmth", "wall as it was", "minutes beside the gas")

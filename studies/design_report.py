@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from controllers.foresight import Delays
     from controllers.margins import Law, Margins
     from controllers.scheduled import Schedule
-    from linearize.modes import Mode
+    from linearize.modes import HybridModel, Mode
     from workbench.plant import Plant
 
 
@@ -64,10 +64,13 @@ def _of_parts(
     from controllers.certificate import certificate
     from controllers.foresight import delays_of, foreseeing
     from controllers.margins import loops, margins
+    from controllers.spool import behind_spool, not_reading_it
 
-    hybrid, sample_time_s = found.hybrid, found.controller.sample_time_s
+    sample_time_s = found.controller.sample_time_s
     for part in parts:
-        axis, delays, laws = getattr(part, "axis", None), delays_of(found.plant, part), part.laws
+        axis, delays = getattr(part, "axis", None), delays_of(found.plant, part)
+        hybrid = behind_spool(found.hybrid, delays.spool_s)
+        laws = not_reading_it(part.laws, delays.spool_s)
         ahead = foreseeing(hybrid, laws, sample_time_s, axis) if delays.foreseen else laws
         whole = (hybrid, ahead, sample_time_s, delays.both_s, axis)
         by_mode = tuple(margins(*whole))
@@ -82,25 +85,31 @@ def _of_parts(
             margins=by_mode,
             growth={name: growth for name, growth in growing.items() if growth},
             certificate=certificate(exact, sample_time_s),
-            filtered=_filtered(found, ahead, delays, axis) if delays.foreseen else (),
+            filtered=_filtered(hybrid, ahead, sample_time_s, delays, axis),
         )
 
 
 def _filtered(
-    found: Design, laws: Schedule[Law], delays: Delays, axis: Axis | None
+    hybrid: HybridModel,
+    laws: Schedule[Law],
+    sample_time_s: float,
+    delays: Delays,
+    axis: Axis | None,
 ) -> tuple[Margins, ...]:
     """Margins behind filters for the noise of `check`, which know what commands have arrived."""
+    if not delays.foreseen:
+        return ()
     from controllers.margins import margins
     from controllers.output_feedback import lqg_law
     from controllers.scheduled import with_modes
 
-    sample_time_s, noises = found.controller.sample_time_s, _noises(found.plant)
+    noises = _noises(hybrid.plant)
 
     def behind_filter(mode: Mode, law: Law) -> Law:
         return lqg_law(mode, law, *noises, sample_time_s, delays.commands_s)
 
-    filtered = with_modes(found.hybrid, laws, behind_filter, axis)
-    return tuple(margins(found.hybrid, filtered, sample_time_s, delays.both_s, axis))
+    filtered = with_modes(hybrid, laws, behind_filter, axis)
+    return tuple(margins(hybrid, filtered, sample_time_s, delays.both_s, axis))
 
 
 def _noises(plant: Plant) -> tuple[Mapping[str, float], Mapping[str, float]]:
