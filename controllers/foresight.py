@@ -21,10 +21,10 @@ from math import ceil
 import numpy as np
 
 from controllers.axis import Axis
+from controllers.lags import Lag, lags_of
 from controllers.margins import Law, both_ways_s, unforeseen_s
 from controllers.on_measurement import OnMeasurement
 from controllers.scheduled import Schedule, with_modes
-from controllers.spool import spool_lag_s
 from linearize.discrete import sampled
 from linearize.modes import HybridModel, Mode
 from workbench.contracts import Controller
@@ -38,14 +38,13 @@ SLACK = 1e-6  # of a sample, as of the estimators
 class Delays:
     """What is late in a loop: sensors, commands, and whether an estimator foresees the latter.
 
-    ``spool_s`` is the time constant of the valve's spool, as it is led where an estimator tells of
-    it (:mod:`controllers.spool`).
+    ``lags`` are those of the spool and of a sensor that are in the loop (:mod:`controllers.lags`).
     """
 
     sensors_s: float
     commands_s: float
     foreseen: bool
-    spool_s: float = 0.0
+    lags: tuple[Lag, ...] = ()
 
     @property
     def both_s(self) -> float:
@@ -61,8 +60,8 @@ class Delays:
 def delays_of(plant: Plant, law: Controller) -> Delays:
     """Those that a law is designed for: one on the measurement itself meets all of both."""
     sensors_s, foreseen = unforeseen_s(plant), not isinstance(law, OnMeasurement)
-    spool_s = spool_lag_s(plant, foreseen, getattr(law, "axis", None))
-    return Delays(sensors_s, both_ways_s(plant) - sensors_s, foreseen, spool_s)
+    commands_s = both_ways_s(plant) - sensors_s
+    return Delays(sensors_s, commands_s, foreseen, lags_of(plant, law))
 
 
 def foreseeing(

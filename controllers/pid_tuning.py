@@ -5,7 +5,7 @@ tied to K_p by the integral time these are two linear equations for K_p and K_d,
 
     K_p (1 + I(w) / T_i) + K_d H(w) = exp(j (margin - pi)) / G(w)
 
-where G is the sampled mode with its delays and the lag of its spool, I the summation and H the
+where G is the sampled mode with its delays and lags, I the summation and H the
 derivative filter as they are run.  Where they ask for a negative K_d the phase suffices without,
 and K_d is zero.  Where the loop is unstable or bears too little gain, no PID of that bandwidth is
 right, and the answer names the nearest that is right on all modes.  A lightly damped spring leaves
@@ -25,11 +25,11 @@ import numpy as np
 from controllers.axis import axis_of
 from controllers.charging import charging_on
 from controllers.derivative import Derivative, LowPassDerivative
+from controllers.lags import behind_lags, measured_lags
 from controllers.margins import Law, Margins, both_ways_s, closed, loop, margins_of
 from controllers.motion import MotionLimits, sliding_on
 from controllers.scheduled import Schedule, constant, driven_modes, scheduled
 from controllers.spec import ranged
-from controllers.spool import behind_spool, spool_lag_s
 from controllers.through_valve import through_valve
 from controllers.two_degree_pid import Dither, Feedforward, PidGains, TwoDegreePid, law_of
 from linearize.modes import HybridModel, Mode
@@ -105,7 +105,7 @@ def margin_of_overshoot(overshoot: float) -> float:
 def tuned_pid(
     hybrid: HybridModel, spec: TuningSpec | None = None, parts: PidParts | None = None
 ) -> TwoDegreePid:
-    """A PID with the gains of each mode from one specification, at the plant's delays and lag.
+    """A PID with the gains of each mode from one specification, at the plant's delays and lags.
 
     Raises
     ------
@@ -114,7 +114,8 @@ def tuned_pid(
     """
     spec, parts = spec or TuningSpec(), parts or PidParts()
     delay_s = both_ways_s(hybrid.plant)
-    lagging = behind_spool(hybrid, spool_lag_s(hybrid.plant, told=False))
+    lags = measured_lags(hybrid.plant, axis_of(hybrid.plant).position)
+    lagging = behind_lags(hybrid, lags)
     modes = tuple(mode for side in driven_modes(lagging) for mode in side)
     gains = scheduled(lagging, lambda mode: tuned_gains(mode, spec, parts, delay_s, modes))
     return pid_with(hybrid, gains, parts)

@@ -275,6 +275,6 @@ def _left_out(plant: Plant) -> Iterator[LeftOut]:
         elif isinstance(member, ValveHysteresis):
             yield LeftOut(member.name, "no play", "a play has no linear model")
         elif isinstance(member, SensorLag):
-            yield LeftOut(member.name, "no lag", "the margins must hold it")
+            yield LeftOut(member.name, "no lag", "estimators know it, or margins hold it")
         elif isinstance(member, Timing):
             yield LeftOut(member.name, "no delay", "acts on samples; the margins must hold it")

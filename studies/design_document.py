@@ -43,7 +43,7 @@ def _law(part: LawReport) -> Document:
     return {
         "body": part.body,
         "delays_s": {"sensors": part.delays.sensors_s, "commands": part.delays.commands_s},
-        "spool_lag_s": part.delays.spool_s,
+        "lags_s": {lag.name: lag.time_constant_s for lag in part.delays.lags},
         "commands_foreseen": part.delays.foreseen,
         "margins": [_margins(each, part) for each in part.margins],
         "margins_with_kalman_filter": [_numbers(each) for each in part.filtered],

@@ -63,14 +63,14 @@ def _of_parts(
 ) -> Iterator[LawReport]:
     from controllers.certificate import certificate
     from controllers.foresight import delays_of, foreseeing
+    from controllers.lags import behind_lags, not_reading
     from controllers.margins import loops, margins
-    from controllers.spool import behind_spool, not_reading_it
 
     sample_time_s = found.controller.sample_time_s
     for part in parts:
         axis, delays = getattr(part, "axis", None), delays_of(found.plant, part)
-        hybrid = behind_spool(found.hybrid, delays.spool_s)
-        laws = not_reading_it(part.laws, delays.spool_s)
+        hybrid = behind_lags(found.hybrid, delays.lags)
+        laws = not_reading(part.laws, delays.lags)
         ahead = foreseeing(hybrid, laws, sample_time_s, axis) if delays.foreseen else laws
         whole = (hybrid, ahead, sample_time_s, delays.both_s, axis)
         by_mode = tuple(margins(*whole))

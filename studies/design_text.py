@@ -87,9 +87,9 @@ def _in_the_loop(delays: Delays) -> str:
     commands = f"commands, {FORESEEN}" if delays.foreseen else "commands"
     sizes = {"sensors": delays.sensors_s, commands: delays.commands_s}
     late = [f"{1e3 * size:g} ms of the {whose}" for whose, size in sizes.items() if size]
-    if delays.spool_s:
-        led = ", led by what an estimator tells of it" if delays.foreseen else ""
-        late.append(f"a spool's lag of {number(1e3 * delays.spool_s, 3)} ms{led}")
+    led = ", led by what an estimator tells of it" if delays.foreseen else ""
+    for lag in delays.lags:
+        late.append(f"a lag of {number(1e3 * lag.time_constant_s, 3)} ms of the {lag.name}{led}")
     knows = ALL_STATES if delays.foreseen else MEASURED
     return f"with {' and '.join(late)}; {knows}" if late else f"without delays; {knows}"
 

@@ -6,10 +6,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from controllers.foresight import foreseeing
+from controllers.lags import behind_lags, not_reading, spool_lag
 from controllers.margins import Margins, both_ways_s, margins_of
 from controllers.per_mode import Method, PerModeSpec, per_mode
 from controllers.scheduled import driven_modes
-from controllers.spool import behind_spool, not_reading_it, spool_lag_s
 from estimators import ESTIMATORS
 from estimators.raw import RAW
 from linearize.standard import SHIFT_MODES, SLIDE_MODES, slide_modes
@@ -55,14 +55,14 @@ def usual_spec(plant: Plant) -> str:
 
 def mode_offers(rig: Rig, say: Say) -> Offers:
     """The margins of every method in every driven mode."""
-    hybrid, lag_s = slide_modes(rig.plant), spool_lag_s(rig.plant, told=True)
-    lagging, delay_s = behind_spool(hybrid, lag_s), both_ways_s(rig.plant)
+    hybrid, lags = slide_modes(rig.plant), spool_lag(rig.plant, told=True)
+    lagging, delay_s = behind_lags(hybrid, lags), both_ways_s(rig.plant)
     sides = driven_modes(lagging)
     found: dict[str, dict[Method, Margins]] = {m.name: {} for side in sides for m in side}
     for method in Method:
         say(f"margins of {method.value} in {len(found)} modes")
         spec = PerModeSpec(modes=dict.fromkeys(found, method))
-        laws = not_reading_it(per_mode(hybrid, spec).laws, lag_s)
+        laws = not_reading(per_mode(hybrid, spec).laws, lags)
         laws = foreseeing(lagging, laws, spec.sample_time_s)
         for modes, side in zip(sides, (laws.forward, laws.backward), strict=True):
             for mode, law in zip(modes, side, strict=True):

@@ -1,4 +1,4 @@
-"""The spool's lag in margins and tuning: the modes leave it out, the loops have it."""
+"""Lags of spool and sensor in margins and tuning: the modes leave them out, the loops do not."""
 
 from dataclasses import replace
 
@@ -9,10 +9,10 @@ from commands import call
 
 from controllers.design_file import design
 from controllers.foresight import delays_of
+from controllers.lags import Lag, behind_lags, lags_of, measured_lags, spool_lag, unread
 from controllers.margins import Law, both_ways_s, loop, margins_of
 from controllers.pid_tuning import PidParts, TuningSpec, pid_margins, tuned_pid
 from controllers.scheduled import driven_modes
-from controllers.spool import behind_spool, spool_lag_s, unread
 from controllers.through_valve import LED_S
 from linearize.standard import axis_modes, standard_modes
 from studies.design_report import design_report
@@ -21,6 +21,7 @@ from workbench.plants.servo_drive import servo_drive
 
 DT = 1e-3
 SLOW_S = 15e-3
+SLOW = Lag("spool", SLOW_S)
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +46,7 @@ def proportional(gain):
 
 def test_the_loop_with_a_spool_is_that_of_python_control(hybrid, mode):
     """Lag and mode in series by another package, held openings: the same L(z)."""
-    lagging = driven_modes(behind_spool(hybrid, SLOW_S))[0][1]
+    lagging = driven_modes(behind_lags(hybrid, [SLOW]))[0][1]
     A, B, C = loop(lagging, unread(proportional(30.0)), DT)
     lag = control.ss(-1.0 / SLOW_S, 1.0 / SLOW_S, 1.0, 0.0)
     place = control.ss(mode.A, mode.B, np.eye(4)[:1], 0.0)
@@ -58,7 +59,7 @@ def test_the_loop_with_a_spool_is_that_of_python_control(hybrid, mode):
 
 def test_a_spool_takes_its_phase_from_the_margin(hybrid, mode):
     """At a crossover w a first-order lag turns the loop by atan(w T)."""
-    lagging = driven_modes(behind_spool(hybrid, 1e-3))[0][1]
+    lagging = driven_modes(behind_lags(hybrid, [Lag("spool", 1e-3)]))[0][1]
     fast = margins_of(mode, proportional(10.0), DT)
     slow = margins_of(lagging, unread(proportional(10.0)), DT)
     crossing = fast.phase_rad / fast.delay_s
@@ -70,16 +71,41 @@ def test_without_a_lag_nothing_stands_before_the_modes():
     plant = servo_drive()
     hybrid = standard_modes(plant)
 
-    assert spool_lag_s(plant, told=True) == spool_lag_s(plant, told=False) == 0.0
-    assert behind_spool(hybrid, 0.0) is hybrid
+    assert spool_lag(plant, told=True) == measured_lags(plant, plant.measured[0]) == ()
+    assert behind_lags(hybrid, []) is hybrid
 
 
 def test_a_spool_is_led_where_an_estimator_tells_of_it_and_only_there(slow):
     """A PID on the measurement meets the whole lag, an LQ behind a filter what leading leaves."""
-    lags = {m: delays_of(slow, design(m, slow).controller).spool_s for m in ("axis-pid", "lq")}
+    lags = {m: delays_of(slow, design(m, slow).controller).lags for m in ("axis-pid", "lq")}
+    fast = slow.with_values({"valve_lag.time_constant_s": 2e-3})
 
-    assert lags == {"axis-pid": SLOW_S, "lq": LED_S}
-    assert spool_lag_s(slow.with_values({"valve_lag.time_constant_s": 2e-3}), told=True) == 2e-3
+    assert lags == {"axis-pid": (SLOW,), "lq": (Lag("spool", LED_S),)}
+    assert spool_lag(fast, told=True) == (Lag("spool", 2e-3),)
+
+
+def test_half_of_a_reading_through_a_lag_is_that_of_python_control(hybrid, mode):
+    """Behind the position, where it stands, another package has the same loop."""
+    half = Lag("sensor", 20e-3, 0.5)
+    lagging = driven_modes(behind_lags(hybrid, [half]))[0][1]
+    A, B, C = loop(lagging, unread(proportional(30.0)), DT)
+    sensor = control.parallel(control.ss(-50.0, 50.0, 0.5, 0.0), control.ss([], [], [], 0.5))
+    place = control.ss(mode.A, mode.B, np.eye(4)[:1], 0.0)
+    whole = control.c2d(control.series(place, sensor), DT, "zoh")
+    z = np.exp(1j * DT * np.geomspace(1.0, 3000.0, 40))
+
+    assert control.ss(A, B, C, 0.0, DT)(z) == pytest.approx(30.0 * whole(z), rel=1e-6)
+
+
+def test_the_lag_of_a_sensor_is_in_the_loop_of_a_law_on_that_sensor_alone(slow):
+    """Estimators know it: an LQ behind one does not meet it, nor a PID that of a pressure."""
+    place, pressure = "slide.position", "chamber_a.pressure"
+    values = {f"sensor_lag@{place}.lagged_share": 0.5, f"sensor_lag@{pressure}.lagged_share": 1.0}
+    both = slow.with_values({**values, f"sensor_lag@{place}.time_constant_s": 20e-3})
+    pid, lq = (design(method, both).controller for method in ("axis-pid", "lq"))
+
+    assert lags_of(both, pid) == (SLOW, Lag("sensor", 20e-3, 0.5))
+    assert lags_of(both, lq) == (Lag("spool", LED_S),)
 
 
 @pytest.mark.parametrize("method", ["axis-pid", "lq"])
@@ -101,7 +127,7 @@ def test_gains_are_tuned_with_the_spool_in_the_loop():
     """Those for a fast spool lack their margin of phase behind a slow one."""
     spec, parts = TuningSpec(bandwidth_hz=5.0), PidParts()
     late = crr_rig().with_values({"valve_lag.time_constant_s": SLOW_S})
-    lagging = driven_modes(behind_spool(axis_modes(late), SLOW_S))
+    lagging = driven_modes(behind_lags(axis_modes(late), [SLOW]))
     delay_s = both_ways_s(late)
 
     def least(plant):
@@ -120,4 +146,4 @@ def test_design_says_that_a_spool_is_in_the_loop(tmp_path):
     answer = call("design", path, "--controller", "lq", "-o", tmp_path / "design.toml", "-q")
 
     assert answer.exit_code == 0, answer.output
-    assert "a spool's lag of 4 ms, led by what an estimator tells of it" in answer.stdout
+    assert "a lag of 4 ms of the spool, led by what an estimator tells of it" in answer.stdout
