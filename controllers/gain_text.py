@@ -14,6 +14,7 @@ from workbench.contracts import Controller
 from workbench.units import public_name, si_unit
 
 DIGITS = 4
+ROUNDED = 1e-6  # of the farthest place: what is nearer to zero is a zero that was searched for
 OUTER = {"stiffness": "N/m", "damping": "N s/m", "restoring": "N/(m s)"}
 """The outer gains of a cascade, in their order."""
 
@@ -70,10 +71,11 @@ def _states(part: Any) -> tuple[str, ...]:
 
 
 def _of_axis(schedule: Any, states: tuple[str, ...], body: str) -> Iterator[GainRow]:
-    unit = si_unit(states[0])
+    unit, widest = si_unit(states[0]), float(np.abs(schedule.positions_m).max())
     for way in ("forward", "backward"):
         for place, gain in zip(schedule.positions_m, getattr(schedule, way), strict=True):
-            name = f"{body}{way} at {place:.{DIGITS}g} {unit}"
+            at = 0.0 if abs(place) < ROUNDED * widest else place
+            name = f"{body}{way} at {at:.{DIGITS}g} {unit}"
             yield GainRow(name, tuple(_numbers(gain, states, unit)), getattr(gain, "poles", None))
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from controllers.design_file import parse_design
 from controllers.on_measurement import OnMeasurement
+from controllers.pressure import PressureControl
 from estimators import ESTIMATORS
 from estimators.per_mode import names_of
 from estimators.raw import RAW
@@ -148,10 +149,29 @@ def loops_of(
     if name not in SHIFT_MODES:
         wanted = wanted or (USUAL,)
         named = [one for choice in wanted for one in names_of(choice)]
-        measured = all(isinstance(law, OnMeasurement) for law in controllers.values())
-        raw = (RAW,) if measured or name in BENCHES else ()
-        require(named, (*ESTIMATORS, *raw), "the list of estimators")
+        require(named, (*ESTIMATORS, RAW), "the list of estimators")
+        if RAW in named:
+            _require_measured(rig.plant, controllers)
     return Loops(rig, controllers, wanted, chosen)
+
+
+def _require_measured(plant: Plant, controllers: Mapping[str, Controller]) -> None:
+    """Refuse `raw` for laws that ask for states which no sensor of the plant measures.
+
+    Raises
+    ------
+    InputError
+        With the names of their designs.
+    """
+    unseen = [
+        name
+        for name, law in controllers.items()
+        if not isinstance(law, OnMeasurement)
+        and not (isinstance(law, PressureControl) and {*law.model.states} <= {*plant.measured})
+    ]
+    if unseen:
+        what = f"{RAW} gives what is measured, and {listed(unseen)} asks for more"
+        raise InputError(Message(what, expected=f"one of {listed(ESTIMATORS)}"))
 
 
 def _controllers(rig: Rig, designs: Mapping[Path, str]) -> dict[str, Controller]:

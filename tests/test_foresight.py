@@ -16,6 +16,7 @@ from studies.design_report import design_report
 from studies.design_text import design_texts
 from studies.text import number
 from workbench.errors import InputError
+from workbench.plants import PLANTS
 from workbench.plants.crr_rig import crr_rig
 from workbench.plants.servo_drive import servo_drive
 from workbench.rig import default_rig
@@ -125,6 +126,25 @@ def test_only_a_law_on_the_measurement_is_checked_on_a_drive_without_an_estimato
     for designs in (lq, texts):
         with pytest.raises(InputError, match="raw"):
             loops_of(default_rig(plant), designs, ["raw"], ["step"])
+
+
+@pytest.mark.parametrize(
+    ("method", "name"),
+    [("axis-lq", "crr_rig"), ("joint-lq", "crr_leg"), ("pressure", "soft_joint")],
+)
+def test_raw_is_refused_on_a_bench_where_a_law_asks_for_what_no_sensor_gives(
+    tmp_path, method, name
+):
+    """It had ended inside the program, with a KeyError; a pressure is all that a bellows has."""
+    plant = PLANTS[name]()
+    write_design(design(method, plant), path := tmp_path / "design.toml")
+    asked = default_rig(plant), {path: path.read_text()}, ["raw"]
+
+    if method == "pressure":
+        assert loops_of(*asked).estimators == ("raw",)
+        return
+    with pytest.raises(InputError, match="raw gives what is measured, and design asks for more"):
+        loops_of(*asked)
 
 
 def test_a_law_on_the_measurement_has_the_margins_that_it_was_tuned_for():

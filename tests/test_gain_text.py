@@ -57,3 +57,4 @@ def test_gains_of_a_leg_are_told_joint_by_joint():
 
     assert len(names) == 3 * 6 * 2
     assert names[0].startswith("joint_1, forward at ") and names[0].endswith(" rad")
+    assert "joint_1, forward at 0 rad" in names  # it had been 7.907e-10 rad
