@@ -25,7 +25,18 @@ from studies.kept import Kept
 from studies.study import Claim, Extent, Outcome, Study
 from studies.text import columns, number
 from studies.versions import work_folder
-from studies.yardsticks import LIMITS, PAYLOADS_KG, Draw, draws, figures_of, measured
+from studies.yardsticks import (
+    LATE_S,
+    LIMITS,
+    PAYLOADS_KG,
+    Draw,
+    draw_of,
+    draws,
+    figures_of,
+    late,
+    measured,
+    told_apart,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -65,7 +76,7 @@ def run(folder: Path, extent: Extent, say: Callable[[str], None]) -> Outcome:
     """Every design with every payload, draw by draw; a second start goes on."""
     kept, rows = Kept(work_folder(folder) / "rows.jsonl"), {}
     for name, (method, numbers) in DESIGNS.items():
-        for draw in draws(DRAWS[extent]):
+        for draw in map(late, draws(DRAWS[extent])):
             key = f"{name} {draw.payload_kg:g} {draw.number}"
             if key not in kept:
                 say(f"{name} with {draw.payload_kg:g} kg, draw {draw.number + 1}")
@@ -129,7 +140,7 @@ def _claims(rows: Rows) -> Iterator[Claim]:
         holds = max(medians) <= limit and max(spreads) <= 2.0 * limit
         yield Claim(f"{best}, every payload, {mark}: {limit:g} at most", told, holds)
     lost = [
-        f"{name} with {kg:g} kg, draw {k + 1}"
+        f"{name} with {kg:g} kg, draw {k + 1}: {told_apart(draw_of(k, kg))}"
         for (name, kg), found in rows.items()
         for k, row in enumerate(found)
         if name == best and None in row.values()
@@ -152,7 +163,8 @@ def _text(rows: Rows) -> str:
     ]
     limits = ("limit", "-", *(f"{limit:g}" for limit in LIMITS.values()))
     draws_run = len(next(iter(rows.values())))
-    told = f"median over {draws_run} draws of the parameters, in brackets 95 % of them"
+    told = f"median over {draws_run} draws of the parameters, in brackets 95 % of them; sensors "
+    told += f"with noise, commands of 12 bits that come {1e3 * LATE_S:g} ms late"
     return f"{columns(head, [limits, *lines])}\n{told}"
 
 

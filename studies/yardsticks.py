@@ -1,8 +1,8 @@
 """Published results that a position controller of the servo drive is measured against.
 
-Each is run on the whole plant with its stiction, noise and 12-bit command.  The plant's parameters
-are drawn from their uncertainty; design and estimator keep the nominal ones, and know the payload
-within 20 %.  Errors are of the true position.
+Each is run on the whole plant with its stiction, noise and 12-bit command, in study ``controllers``
+a sample late (:func:`late`).  The plant's parameters are drawn from their uncertainty; design and
+estimator keep the nominal ones, and know the payload within 20 %.  Errors are of the true position.
 
 Source: Y. Zhu and E. J. Barth, "Accurate sub-millimeter servo-pneumatic tracking using model
 reference adaptive control", 2010; G. M. Bone and S. Ning, "Experimental comparison of position
@@ -20,7 +20,7 @@ import numpy as np
 from controllers.design_file import design
 from linearize.axes import stroke_m
 from linearize.standard import POSITION
-from studies.checking import drawn
+from studies.checking import apart, drawn
 from studies.closed_loop_check import run, standard_estimator
 from studies.closed_loop_metrics import Metrics, measure
 from studies.scenarios import SAMPLE_TIME_S, Scenario
@@ -34,6 +34,7 @@ MASS = "slide.mass_kg"
 PAYLOADS_KG = (2.2, 5.8, 10.0)
 PAYLOAD_KG = 5.8  # of studies that vary something else
 KNOWN_WITHIN = 0.2
+LATE_S = 1e-3  # of the commands, a sample: what is measured now acts from the next on; chosen
 CYCLE_M = 0.1e-3  # motion at rest that counts as a limit cycle
 FIRST_SEED = 1001  # of draws that no design was tuned on
 
@@ -78,6 +79,19 @@ def _of(number: int, payloads_kg: tuple[float, ...]) -> Iterator[Draw]:
     for kg in payloads_kg:
         believed = rig.plant.with_values({MASS: kg * factor})
         yield Draw(kg, number, found.with_values({MASS: kg}), believed)
+
+
+def late(draw: Draw, delay_s: float = LATE_S) -> Draw:
+    """The same draw with commands that come late, which design and estimator know."""
+    delay = {"command_delay.delay_s": delay_s}
+    plant, believed = (each.with_values(delay) for each in (draw.plant, draw.believed))
+    return replace(draw, plant=plant, believed=believed)
+
+
+def told_apart(draw: Draw) -> str:
+    """What sets the plant of a draw apart but its payload, in standard deviations."""
+    loaded = default_rig(servo_drive().with_values({MASS: draw.payload_kg}))
+    return apart(loaded, draw.plant)
 
 
 def figures_of(rows: Sequence[Mapping[str, float | None]], mark: str) -> np.ndarray:

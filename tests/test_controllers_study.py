@@ -4,7 +4,19 @@ import numpy as np
 import pytest
 
 from studies.controllers_study import DESIGNS, outcome
-from studies.yardsticks import FINAL, HALF, KNOWN_WITHIN, LIMITS, MASS, PAYLOADS_KG, draws, sine
+from studies.yardsticks import (
+    FINAL,
+    HALF,
+    KNOWN_WITHIN,
+    LATE_S,
+    LIMITS,
+    MASS,
+    PAYLOADS_KG,
+    draws,
+    late,
+    sine,
+)
+from workbench.simulation import command_delay_s
 
 BEST = next(iter(DESIGNS))
 
@@ -43,7 +55,8 @@ def test_a_draw_that_is_lost_is_named_and_the_figure_is_drawn_without_it():
     found = outcome(lost)
     claim = found.claims[-1]
 
-    assert not claim.holds and claim.found == "cascade with 10 kg, draw 3"
+    assert not claim.holds and claim.found.startswith("cascade with 10 kg, draw 3: ")
+    assert claim.found.count(" sd") == 3 and "mass" not in claim.found
     assert list(found.figures) == ["yardsticks"]
     assert len(found.figures["yardsticks"].axes) == len(LIMITS)
     shown = found.figures["yardsticks"].axes[0].get_legend_handles_labels()[1]
@@ -67,6 +80,15 @@ def test_draws_repeat_and_know_the_payload_within_a_fifth():
     assert np.ptp(known) > 0.05
     valves = {each.plant.values["valve.flow_area_m2"] for each in first}
     assert len(valves) == 4
+
+
+def test_commands_come_a_sample_late_and_design_and_estimator_know_it():
+    (early,) = draws(1, (5.8,))
+    found = late(early)
+
+    for plant, before in ((found.plant, early.plant), (found.believed, early.believed)):
+        assert command_delay_s(plant) == LATE_S and command_delay_s(before) == 0.0
+        assert {**plant.values, "command_delay.delay_s": 0.0} == before.values
 
 
 def test_a_sine_is_judged_in_its_second_period():
