@@ -9,6 +9,11 @@ L(z) = -law(z) (z I - F)^-1 (G_0 z^-n + G_1 z^-(n+1)),   delay = n T + rest
 G_0 is what an opening does in the T - rest of a sample that is left when it arrives, G_1 the rest.
 A law that foresees the delay of the commands is one of :mod:`controllers.foresight`.
 
+What switches between laws is a closed loop in coordinates that do not jump with them.  An integral
+I that a bumpless transfer sets anew does: what goes on is the opening before this sample's share of
+it, r = I + direct(x).  Then A depends on the direct part of a law times the integral gain, and its
+mixes lie between those of every direct part with every integral gain.
+
 Source: K. J. Astrom and B. Wittenmark, "Computer-Controlled Systems", 3rd ed., Ch. 2 (delay);
 P. Seiler, A. Packard and P. Gahinet, "An Introduction to Disk Margins", IEEE Control Systems
 Magazine 40 (5) (2020) 78 (disk).
@@ -17,7 +22,7 @@ Magazine 40 (5) (2020) 78 (disk).
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, pi, tau
 
 import numpy as np
@@ -40,12 +45,15 @@ class Law:
     s[k+1] = A s[k] + B x[k],   u[k] = C s[k] + D x[k]
 
     A, B, C, D       shapes (n_s, n_s), (n_s, 4), (n_s,) and (4,)
+    bumpless         whether the last memory, an integral, is set at a change of law so that the
+                     opening stays as it is
     """
 
     A: np.ndarray
     B: np.ndarray
     C: np.ndarray
     D: np.ndarray
+    bumpless: bool = False
 
 
 @dataclass(frozen=True)
@@ -104,13 +112,14 @@ def loops(
 ) -> dict[str, tuple[np.ndarray, ...]]:
     """Closed loops by driven mode: under its own law, then under those that are mixed into it.
 
-    These are the laws of the same place and of both neighbours, for both directions of motion.
+    These are the laws of the same place and of both neighbours, for both directions of motion, and
+    of bumpless ones the direct part of each with the integral gain of each.
     """
     sides, found = (laws.forward, laws.backward), {}
     for own, modes in enumerate(driven_modes(hybrid, axis)):
         for place, mode in enumerate(modes):
             near = slice(max(place - 1, 0), place + 2)
-            mixed = [law for side in sides for law in side[near] if law is not sides[own][place]]
+            mixed = _mixed([law for side in sides for law in side[near]], sides[own][place])
             found[mode.name] = tuple(
                 closed(mode, law, sample_time_s, delay_s) for law in (sides[own][place], *mixed)
             )
@@ -118,9 +127,39 @@ def loops(
 
 
 def closed(mode: Mode, law: Law, sample_time_s: float, delay_s: float = 0.0) -> np.ndarray:
-    """The closed loop x[k+1] = A x[k], shape (n, n), states as in :func:`loop`."""
+    """The closed loop x[k+1] = A x[k], shape (n, n), states as in :func:`loop`.
+
+    The last memory of a bumpless law is r of the module instead.
+    """
     A, B, C = loop(mode, law, sample_time_s, delay_s)
-    return A - B @ C
+    if not law.bumpless:
+        return A - B @ C
+    goes_on = np.concatenate([(law.D - law.C[-1] * law.B[-1]) * mode.scale, law.C])
+    T = np.eye(len(A))
+    T[len(goes_on) - 1, : len(goes_on)] = goes_on
+    return T @ (A - B @ C) @ np.linalg.inv(T)
+
+
+def crossed(law: Law, other: Law) -> Law:
+    """The direct part of one bumpless law with the integral gain of another."""
+    gain = other.C[-1]
+    direct = law.D + (gain - law.C[-1]) * law.B[-1]
+    return replace(law, C=np.append(law.C[:-1], gain), D=direct)
+
+
+def _mixed(laws: list[Law], own: Law) -> list[Law]:
+    """What is mixed into a law: the others, or what they make with one another; each once."""
+    if own.bumpless:
+        laws = [crossed(law, other) for law in laws for other in laws]
+    found = [own]
+    for law in laws:
+        if not any(_same(law, known) for known in found):
+            found.append(law)
+    return found[1:]
+
+
+def _same(law: Law, other: Law) -> bool:
+    return all(np.array_equal(getattr(law, k), getattr(other, k)) for k in "ABCD")
 
 
 def unforeseen_s(plant: Plant) -> float:
@@ -193,6 +232,16 @@ def _delayed(
         parts = [G - arrived, arrived]
     effects = np.array([*parts, *([np.zeros_like(G)] * n)])
     return F, effects[-1], effects[:-1]
+
+
+def in_volts(law: Law) -> Law:
+    """The same law whose last memory, an integral, goes on in volts where the laws change."""
+    gain = law.C[-1]
+    if gain == 0.0:
+        return law
+    B, C = law.B.copy(), law.C.copy()
+    B[-1], C[-1] = gain * B[-1], 1.0
+    return replace(law, B=B, C=C)
 
 
 def integral_of(feedback: np.ndarray, integral: float, sample_time_s: float) -> Law:

@@ -22,7 +22,7 @@ import numpy as np
 
 from controllers.cascade import CascadeSpec, cascade_gain
 from controllers.lq import Gain, gain_of, lq_gain
-from controllers.margins import Law
+from controllers.margins import Law, in_volts
 from controllers.motion import PREVIEW
 from controllers.pid import PidSpec, pid_gain
 from controllers.positioning import STATES, Memory, Positioning, PositioningSpec, positioning
@@ -66,8 +66,8 @@ class PerMode:
 
     @property
     def laws(self) -> Schedule[Law]:
-        """What it does while the slide moves and no limit is met."""
-        return self.gains.mapped(lambda gain: gain.law(self.sample_time_s))
+        """What it does while the slide moves and no limit is met; the memory is in V."""
+        return self.gains.mapped(lambda gain: in_volts(gain.law(self.sample_time_s)))
 
     def start(self) -> Command:
         return Command(self.task.valve.shut, Memory(plan=0.0))

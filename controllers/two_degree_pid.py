@@ -229,4 +229,4 @@ def law_of(gains: PidGains, slopes: Filter, sample_time_s: float, states: int = 
         moved = np.vstack([moved, sample_time_s * place])
         seen = np.array([*seen, gains.integral])
     direct = gains.proportional + gains.derivative * D + gains.integral * sample_time_s
-    return Law(kept, moved, -seen, -direct * place)
+    return Law(kept, moved, -seen, -direct * place, bumpless=bool(gains.integral))
