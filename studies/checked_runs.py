@@ -172,7 +172,7 @@ class CheckedRuns:
                 if not isinstance(found, str):
                     rows += [replace(row, design=self._design(number)) for row in found.rows]
                     records += found.records
-        figures = styled_figures(kind(tuple(rows), tuple(records)))
+        figures = styled_figures(kind(tuple(rows), tuple(records)), self.setup.rig.plant)
         if self.spec:
             from studies.figures.limits import limit_figures
 

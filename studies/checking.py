@@ -21,6 +21,7 @@ from linearize.standard import SHIFT_MODES, SLIDE_MODES
 from studies.closed_loop_check import Check, check
 from studies.closed_loop_figures import check_figures
 from studies.figures.following import following_figures
+from studies.figures.foot import LEG, foot_figures
 from studies.figures.shifts import shift_figures
 from studies.figures.style import styled
 from studies.following import BENCHES
@@ -264,9 +265,10 @@ def recorded_runs(loops: Loops, runs: int, say: Callable[[str], None]) -> Checke
     return replace(found, rows=tuple(rows), records=tuple(records))
 
 
-def styled_figures(found: Checked) -> dict[str, Figure]:
-    """The figures of a check in the common style."""
+def styled_figures(found: Checked, plant: Plant | None = None) -> dict[str, Figure]:
+    """The figures of a check in the common style; of a leg also those of its foot, where given."""
     with styled():
         if isinstance(found, FollowingCheck):
-            return following_figures(found)
+            foot = foot_figures(found, plant) if plant and plant.name == LEG else {}
+            return {**following_figures(found), **foot}
         return shift_figures(found) if isinstance(found, ShiftCheck) else check_figures(found)

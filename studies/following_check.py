@@ -208,13 +208,15 @@ def _place_step(place: np.ndarray, wanted: np.ndarray, task: Task, unit: str) ->
 
 def _foot(plant: Plant, record: LoopRecord, task: Task, controller_s: float) -> Figures:
     """Distance of the true foot from where the wanted angles put it."""
-    geometry = leg_of(plant).geometry
-    rows = [record.recording.rows(task.reference), np.array([*task.reference.values()])]
-    found, wanted = (
-        np.array([[float(x) for x in geometry.foot_m(angles)] for angles in each.T])
-        for each in rows
-    )
+    found = foot_m(plant, record.recording.rows(task.reference))
+    wanted = foot_m(plant, np.array([*task.reference.values()]))
     return _errors(np.linalg.norm(found - wanted, axis=1), task, "m"), {}
+
+
+def foot_m(plant: Plant, angles_rad: np.ndarray) -> np.ndarray:
+    """Places of a leg's foot, shape (n, 3), at angles of its joints, shape (3, n)."""
+    geometry = leg_of(plant).geometry
+    return np.array([[float(x) for x in geometry.foot_m(angles)] for angles in angles_rad.T])
 
 
 def _errors(error: np.ndarray, task: Task, unit: str) -> dict[str, float]:

@@ -125,4 +125,4 @@ def close_loops(
     write_design(found, path)
     loops = loops_of(rig, {path: path.read_text(encoding="utf-8")}, estimators, scenarios)
     checked = recorded_runs(replace(loops, asked=asked.asked if asked else ()), runs, say)
-    return Looped(told, checked, drawings(styled_figures(checked)))
+    return Looped(told, checked, drawings(styled_figures(checked, rig.plant)))
