@@ -67,7 +67,7 @@ class CascadeSpec:
     """
 
     sample_time_s: float = 1e-3
-    bandwidth_hz: float = 14.0
+    bandwidth_hz: float = 15.0
     damping: float = 1.0
     force_bandwidth_hz: float = 70.0
     integral_time_s: float = 0.15
