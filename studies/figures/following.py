@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from studies.closed_loop_figures import by_scenario
+import numpy as np
+
+from studies.closed_loop_figures import WIDER, by_scenario
 from studies.figures.style import GREY, PAGE_IN, look, new_figure
 from studies.following_check import FollowingCheck
-from studies.text import labelled
+from studies.scenarios import LATE_S
+from studies.text import labelled, number
 from workbench.units import display_scale, display_unit
 
 if TYPE_CHECKING:
@@ -18,6 +21,8 @@ if TYPE_CHECKING:
 
 REFERENCE = "reference."
 ROW_IN = 1.3
+JUMP = 0.5  # of the largest error: a reference that moves so far in a sample makes it
+NEAR = 0.04  # of the largest error of a step: what is shown of it at least
 
 
 def following_figures(found: FollowingCheck) -> dict[str, Figure]:
@@ -55,12 +60,27 @@ def _draw_signal(axes: Axes, runs: dict[str, LoopRecord], name: str) -> None:
 
 
 def _draw_error(axes: Axes, runs: dict[str, LoopRecord], name: str) -> None:
+    most = late = 0.0
     for k, (run, record) in enumerate(runs.items()):
         recording = record.recording
-        error = (recording[name] - recording[REFERENCE + name]) / display_scale(name).factor
+        wanted, factor = recording[REFERENCE + name], display_scale(name).factor
+        error = (recording[name] - wanted) / factor
         axes.plot(recording.time_s, error, label=run, **look(k))
+        most = max(most, float(abs(error).max()))
+        late = max(late, float(abs(error[recording.time_s >= recording.time_s[-1] - LATE_S]).max()))
+    if float(abs(np.diff(wanted)).max()) > JUMP * most * factor:
+        _cut(axes, max(NEAR * most, WIDER * late), most, name)
     axes.set_ylabel(f"error\n({display_unit(name)})")
     axes.set_label(f"error of {labelled(name)}")  # in the table
+
+
+def _cut(axes: Axes, end: float, most: float, name: str) -> None:
+    """Near zero alone, with a note: where a step is the error, its end would not be seen."""
+    if most > end:
+        axes.set_ylim(-end, end)
+        unit = display_unit(name)
+        told = f"axis cut at {number(end, 2)} {unit}; errors up to {number(most, 3)} {unit}"
+        axes.set_title(told, loc="right")
 
 
 def _lines(label: str) -> str:
