@@ -132,7 +132,8 @@ def test_the_law_is_what_the_controller_does_near_its_point(controllers, hybrid,
     def openings(change):
         command, found = controller.start(), []
         for _ in range(3):
-            reference = place + 1e-3 + 0.1 * DT * np.arange(controller.preview)
+            step_m = 0.1 * controller.sample_time_s  # as fast as the slide is
+            reference = place + 1e-3 + step_m * np.arange(controller.preview)
             command = controller.step(command, reference[None], Estimate(STATES, base + change, 0))
             found.append(command.notes["opening_v"])
         return np.array(found)
