@@ -46,12 +46,15 @@ def draw_error(axes: Axes, records: dict[str, LoopRecord], largest_m: float = 1e
         late_m = max(late_m, float(abs(error[late]).max()))
     range_m = max(largest_m, WIDER * late_m)
     if most_m > max(A_STEP * largest_m, range_m):
-        axes.set_ylim(-1e3 * range_m, 1e3 * range_m)
-        told = (
-            f"axis cut at {number(1e3 * range_m, 2)} mm; errors up to {number(1e3 * most_m, 3)} mm"
-        )
-        axes.set_title(told, loc="right")
+        cut_near_zero(axes, 1e3 * range_m, 1e3 * most_m, "mm")
     axes.set_ylabel("error (mm)")
+
+
+def cut_near_zero(axes: Axes, end: float, most: float, unit: str) -> None:
+    """Only errors up to ``end`` are shown, with a note of how far they go."""
+    axes.set_ylim(-end, end)
+    told = f"axis cut at {number(end, 2)} {unit}; errors up to {number(most, 3)} {unit}"
+    axes.set_title(told, loc="right")
 
 
 def draw_command(axes: Axes, records: dict[str, LoopRecord]) -> None:

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from studies.closed_loop_figures import WIDER, by_scenario
+from studies.closed_loop_figures import WIDER, by_scenario, cut_near_zero
 from studies.figures.style import GREY, PAGE_IN, look, new_figure
 from studies.following_check import FollowingCheck
 from studies.scenarios import LATE_S
-from studies.text import labelled, number
+from studies.text import labelled
 from workbench.units import display_scale, display_unit
 
 if TYPE_CHECKING:
@@ -68,19 +68,11 @@ def _draw_error(axes: Axes, runs: dict[str, LoopRecord], name: str) -> None:
         axes.plot(recording.time_s, error, label=run, **look(k))
         most = max(most, float(abs(error).max()))
         late = max(late, float(abs(error[recording.time_s >= recording.time_s[-1] - LATE_S]).max()))
-    if float(abs(np.diff(wanted)).max()) > JUMP * most * factor:
-        _cut(axes, max(NEAR * most, WIDER * late), most, name)
+    end = max(NEAR * most, WIDER * late)
+    if most > end and float(abs(np.diff(wanted)).max()) > JUMP * most * factor:
+        cut_near_zero(axes, end, most, display_unit(name))  # the step hides what is left in the end
     axes.set_ylabel(f"error\n({display_unit(name)})")
     axes.set_label(f"error of {labelled(name)}")  # in the table
-
-
-def _cut(axes: Axes, end: float, most: float, name: str) -> None:
-    """Near zero alone, with a note: where a step is the error, its end would not be seen."""
-    if most > end:
-        axes.set_ylim(-end, end)
-        unit = display_unit(name)
-        told = f"axis cut at {number(end, 2)} {unit}; errors up to {number(most, 3)} {unit}"
-        axes.set_title(told, loc="right")
 
 
 def _lines(label: str) -> str:

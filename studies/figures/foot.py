@@ -30,13 +30,13 @@ def foot_figures(found: FollowingCheck, plant: Plant) -> dict[str, Figure]:
 def _figure(runs: dict[str, LoopRecord], plant: Plant) -> Figure:
     figure = new_figure(PAGE_IN, 2.8)
     way, apart = figure.subplots(1, 2)
+    first = next(iter(runs.values())).recording
+    followed = [n for n in first.channels if n.startswith(REFERENCE)]
+    wanted = MM * foot_m(plant, first.rows(followed))
+    way.plot(wanted[:, 1], wanted[:, 2], color=GREY, linestyle="-", label="reference")
     for k, (name, record) in enumerate(runs.items()):
         recording = record.recording
-        followed = [n for n in recording.channels if n.startswith(REFERENCE)]
-        wanted = MM * foot_m(plant, recording.rows(followed))
         seen = MM * foot_m(plant, recording.rows(n.removeprefix(REFERENCE) for n in followed))
-        if k == 0:
-            way.plot(wanted[:, 1], wanted[:, 2], color=GREY, linestyle="-", label="reference")
         way.plot(seen[:, 1], seen[:, 2], label=name, **look(k))
         away = np.linalg.norm(seen - wanted, axis=1)
         apart.plot(recording.time_s, away, label=name, **look(k))
