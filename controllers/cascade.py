@@ -128,7 +128,7 @@ class Cascade:
         if now.rests:
             shut = valve.sent(0.0, estimate)
             return Command(shut, Memory(memory.integral_m_s, True), {"resting": 1.0})
-        here = [*self.gains.weighted(now.x[0], now.ahead)]
+        here = self.gains.weighted(now.x[0], now.ahead)
         force_v, speed_v = (sum(w * getattr(g, key) for w, g in here) for key in ("force", "speed"))
         integral = memory.integral_m_s + self.sample_time_s * now.rate_m
         outer = sum(w * gain.outer for w, gain in here)

@@ -14,7 +14,7 @@ from controllers.margins import Law
 from controllers.mpc_limits import SLACK_UNIT, SLACKS, Limits, soft_rows
 from controllers.mpc_spec import MpcSpec
 from controllers.positioning import STATES
-from controllers.program_solvers import Answer, Daqp, Solver, Start
+from controllers.program_solvers import Answer, Daqp, Solver, Start, Workspace
 from controllers.stacked import pushed_mode, stacked
 from linearize.discrete import sampled
 from linearize.modes import Mode
@@ -211,20 +211,20 @@ class Program:
         return self.solver.solved(self, g, low, high, start)
 
     @cached_property
-    def order(self) -> tuple[np.ndarray, np.ndarray]:
-        """Rows that bound one variable each, in the order of z, and all others."""
+    def order(self) -> np.ndarray:
+        """Rows as DAQP reads them: what bounds one variable each, in the order of z, then the rest."""
         every = np.arange(len(self.rows))
-        bounds = np.concatenate([every[: self.horizon], every[-SLACKS:]])
-        return bounds, every[self.horizon : -SLACKS]
+        return np.concatenate([every[: self.horizon], every[-SLACKS:], every[self.horizon : -SLACKS]])
 
     @cached_property
-    def general(self) -> np.ndarray:
-        """The rows that are no bounds of a variable, as DAQP reads them."""
-        return np.ascontiguousarray(self.rows[self.order[1]])
+    def workspace(self) -> Workspace:
+        """DAQP's, which bounds of single variables do not enter as rows."""
+        general = self.rows[self.order[self.horizon + SLACKS :]]
+        return Workspace(self.hessian, np.ascontiguousarray(general))
 
     def prepared(self) -> Program:
         """The same program with its factors at hand, so that the first sample need not wait."""
-        _ = self.general, self.inverse, self.answer, self.priced
+        _ = self.workspace, self.inverse, self.answer, self.priced
         _ = self.limits.sides, self.limits.within
         return self
 

@@ -62,8 +62,8 @@ def going_with(
     sliding: Schedule[Sliding], place: float, ahead: float, wanted: np.ndarray
 ) -> np.ndarray:
     """Pressures and opening (3,) of a motion (speed, acceleration, jerk), mixed of the modes."""
-    mixed = sum(weight * each.by_motion for weight, each in sliding.weighted(place, ahead))
-    return mixed[:, 0] + mixed[:, 1:] @ wanted
+    moved = np.array([1.0, *wanted.tolist()])
+    return sum(share * (each.by_motion @ moved) for share, each in sliding.weighted(place, ahead))
 
 
 def sliding_on(mode: Mode, axis: Axis, centre_v: float) -> Sliding:

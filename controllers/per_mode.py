@@ -79,7 +79,7 @@ class PerMode:
         if now.rests:
             shut = valve.sent(0.0, estimate)
             return Command(shut, replace(memory, resting=True), {"resting": 1.0})
-        here = [*self.gains.weighted(now.x[0], now.ahead)]
+        here = self.gains.weighted(now.x[0], now.ahead)
         integral_v = memory.plan + dt * now.rate_m * sum(w * gain.integral for w, gain in here)
         feedback = sum(w * gain.feedback for w, gain in here)
         wanted = now.opening_v - feedback @ now.deviation - integral_v

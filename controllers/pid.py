@@ -118,7 +118,7 @@ class Pid:
         if now.rests:
             shut = valve.sent(0.0, estimate)
             return Command(shut, Memory(memory.integral_m_s, True, slow), {"resting": 1.0})
-        here = [*self.gains.weighted(now.x[0], now.ahead)]
+        here = self.gains.weighted(now.x[0], now.ahead)
         kp, ki, kd = (
             sum(w * getattr(gain, key) for w, gain in here)
             for key in ("proportional", "integral", "derivative")

@@ -142,19 +142,20 @@ class Positioning:
         self, memory: Memory, reference: np.ndarray, x: np.ndarray, sample_time_s: float
     ) -> Task:
         """The task now, from the coming reference, shape (1, PREVIEW) or longer."""
-        spec, error_m = self.spec, float(x[0] - reference[0, 0])
+        spec, (place_m, v_m_s, *_) = self.spec, x.tolist()
+        error_m = place_m - float(reference[0, 0])
         wanted = motion(reference[0, :PREVIEW], sample_time_s, spec.limits)
-        speed_m_s = wanted[0]
+        speed_m_s = float(wanted[0])
         turn_per_s = spec.turn_per_s if speed_m_s else spec.standing_per_s
         wish = (speed_m_s - turn_per_s * error_m) / spec.turn_m_s
         ahead = 0.5 + 0.5 * tanh(wish)
-        p_a, p_b, opening_v = going_with(self.sliding, x[0], ahead, wanted).tolist()
-        rise_n = self._stribeck_n(x[1]) * (2.0 * ahead - 1.0)
+        p_a, p_b, opening_v = going_with(self.sliding, place_m, ahead, wanted).tolist()
+        rise_n = self._stribeck_n(v_m_s) * (2.0 * ahead - 1.0)
         rise_pa = rise_n / (2.0 * self.area_m2)
-        near = x[0] - min(max(error_m, -spec.approach_m), spec.approach_m)
+        near = place_m - min(max(error_m, -spec.approach_m), spec.approach_m)
         target = np.array([near, speed_m_s, p_a + rise_pa, p_b - rise_pa])
-        rests = self._rests(memory, error_m, x[1], speed_m_s)
-        rate_m = self._rate_m(error_m, x[1])
+        rests = self._rests(memory, error_m, v_m_s, speed_m_s)
+        rate_m = self._rate_m(error_m, v_m_s)
         return Task(x, target, opening_v, error_m, speed_m_s, ahead, rests, rate_m, rise_n)
 
     def _rests(self, memory: Memory, error_m: float, v_m_s: float, speed_m_s: float) -> bool:

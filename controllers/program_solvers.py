@@ -1,9 +1,9 @@
 """Solvers of the quadratic program of linear MPC: DAQP, which is the usual one, or OSQP.
 
-Both keep nothing from one program to the next, so that a step is the same whatever was solved
-before, and the word of neither is taken for granted: z must be finite and keep all rows.  DAQP is
-an active-set method and exact; OSQP a first-order one, here with tightened tolerances and polish.
-``workbench study control-speed`` prints speed and error of both.
+A step is the same whatever was solved before: of one program DAQP keeps the factors, which do not
+change, and OSQP nothing.  The word of neither is taken for granted: z must be finite and keep all
+rows.  DAQP is an active-set method and exact; OSQP a first-order one, here with tightened
+tolerances and polish.  ``workbench study control-speed`` prints speed and error of both.
 
 Source: D. Arnstrom, A. Bemporad and D. Axehill, "A dual active-set solver for embedded quadratic
 programming using recursive LDL' updates", IEEE Trans. Automatic Control 67 (2022) 4362;
@@ -14,7 +14,7 @@ Programming Computation 12 (2020) 637.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from controllers.condensed import Program
 
 OPTIMAL = 1  # DAQP's flag
+AT_UPPER, AT_LOWER = 1, 3  # its marks of a row that is taken for active at the beginning
 FAR = 1e30  # as good as no bound
 FEASIBLE = 1e-5  # V, or units of the slack
 
@@ -78,27 +79,55 @@ class Daqp:
         high: np.ndarray,
         start: Start | None,
     ) -> Answer | None:
-        import daqp
-
         if not np.isfinite(g).all():
             return None
-        first, rest = program.order
-        lower, upper = np.maximum(low, -FAR), np.minimum(high, FAR)
-        order = np.concatenate([first, rest])
-        z, _, flag, info = daqp.solve(
-            program.hessian,
-            g,
-            program.general,
-            upper[order],
-            lower[order],
-            np.zeros(len(low), dtype=np.int32),
-            dual_start=start.multipliers[order] if start else None,
-        )
+        order = program.order
+        lower, upper = np.maximum(low, -FAR)[order], np.minimum(high, FAR)[order]
+        marks = np.zeros(len(order), dtype=np.int32)
+        if start is not None:
+            held = start.multipliers[order]
+            marks[held > 0.0], marks[held < 0.0] = AT_UPPER, AT_LOWER
+        z, flag, info = program.workspace.solved(g, lower, upper, marks)
         if flag != OPTIMAL:
             return None
         multipliers = np.empty(len(order))
         multipliers[order] = info["lam"]
         return checked(program, Answer(z, int(info["iterations"]), multipliers), low, high)
+
+
+class Workspace:
+    """DAQP on one hessian and one set of rows, whose factors it keeps from call to call.
+
+    Nothing else is kept: every call gives all that changes, and what is active at its beginning.
+    Not for several threads.
+    """
+
+    def __init__(self, hessian: np.ndarray, general: np.ndarray) -> None:
+        self._fixed = hessian, general
+        self._model: Any = None
+
+    def solved(
+        self, g: np.ndarray, lower: np.ndarray, upper: np.ndarray, marks: np.ndarray
+    ) -> tuple[np.ndarray, int, dict[str, Any]]:
+        """Optimum, flag and more, for the sides of all rows and DAQP's marks of them, (n_c,)."""
+        model = self._model or self._factored(len(marks))
+        model.update(f=g, bupper=upper, blower=lower, sense=marks)
+        z, _, flag, info = model.solve()
+        self._model = model if flag == OPTIMAL else None
+        return z, flag, info
+
+    def _factored(self, rows: int) -> Any:
+        """The model of a program without bounds, so that the first call is like all others."""
+        import daqp
+
+        (hessian, general), free = self._fixed, np.full(rows, FAR)
+        model = daqp.Model()
+        model.setup(hessian, np.zeros(len(hessian)), general, free, -free)
+        return model
+
+    def __reduce__(self) -> tuple[type[Workspace], tuple[np.ndarray, np.ndarray]]:
+        """Another process factors anew."""
+        return Workspace, self._fixed
 
 
 @dataclass(frozen=True, kw_only=True)

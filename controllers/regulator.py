@@ -84,7 +84,7 @@ class Regulator:
         p_a, p_b, moving_v = going_with(self.sliding, x[0], ahead, wanted).tolist()
         target = np.array([reference[0, 0], wanted[0], p_a, p_b])
         integral = last.memory + spec.sample_time_s * error
-        here = [*self.gains.weighted(x[0], ahead)]
+        here = self.gains.weighted(x[0], ahead)
         opening_v = moving_v - sum(
             w * (gain.feedback @ (x - target) + gain.integral * integral) for w, gain in here
         )

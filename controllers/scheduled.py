@@ -7,7 +7,7 @@ directions by how clearly the slide is to move: so nothing jumps when the mode c
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import starmap
@@ -54,13 +54,15 @@ class Schedule(Generic[Design]):
         share = (position_m - places[left]) / (places[left + 1] - places[left])
         return left, left + 1, min(max(share, 0.0), 1.0)
 
-    def weighted(self, position_m: float, ahead: float) -> Iterator[tuple[float, Design]]:
+    def weighted(self, position_m: float, ahead: float) -> list[tuple[float, Design]]:
         """Designs that count here with their weights; ``ahead`` is 1 forward, 0 backward."""
         left, right, right_share = self._between(position_m)
+        counting = []
         for share, designs in ((ahead, self.forward), (1.0 - ahead, self.backward)):
             if share > 0.0:
-                yield share * (1.0 - right_share), designs[left]
-                yield share * right_share, designs[right]
+                counting.append((share * (1.0 - right_share), designs[left]))
+                counting.append((share * right_share, designs[right]))
+        return counting
 
     def mapped(self, change: Callable[[Design], Other]) -> Schedule[Other]:
         """The same schedule of what is made of each design."""

@@ -76,7 +76,7 @@ class StateFeedback:
         if now.rests:
             shut = valve.sent(0.0, estimate)
             return Command(shut, Memory(memory.integral_m_s, True), {"resting": 1.0})
-        here = [*self.gains.weighted(now.x[0], now.ahead)]
+        here = self.gains.weighted(now.x[0], now.ahead)
         feedback = sum(w * gain.feedback for w, gain in here)
         integral_gain = sum(w * gain.integral for w, gain in here)
         integral = memory.integral_m_s + self.sample_time_s * now.rate_m

@@ -210,7 +210,7 @@ class TwoDegreePid(OnMeasurement):
 
 def mixed(schedule: Schedule[PidGains], place: float, ahead: float) -> PidGains:
     """The gains at a place and for a direction, mixed from the modes'."""
-    here = [*schedule.weighted(place, ahead)]
+    here = schedule.weighted(place, ahead)
     names = PidGains.__dataclass_fields__
     return PidGains(**{key: float(sum(w * getattr(g, key) for w, g in here)) for key in names})
 

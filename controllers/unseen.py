@@ -70,10 +70,9 @@ def waiting(step: Step, sent: Sent = as_wanted) -> Step:
         before, waited = last, last.memory
         if isinstance(waited, Unseen):
             before = Command(last.value, waited.memory, last.notes)
-        else:
-            waited = Unseen(last.memory, 0)
         if all(map(isfinite, seen.state.tolist())):  # for few numbers quicker than an array
             return step(self, before, reference, seen)
+        waited = waited if isinstance(waited, Unseen) else Unseen(waited, 0)
         try:
             return step(self, before, reference, Watched(**vars(seen)))
         except UnseenError:
