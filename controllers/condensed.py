@@ -212,9 +212,11 @@ class Program:
 
     @cached_property
     def order(self) -> np.ndarray:
-        """Rows as DAQP reads them: what bounds one variable each, in the order of z, then the rest."""
+        """Rows as DAQP reads them: those that bound one variable each, as in z, then the rest."""
         every = np.arange(len(self.rows))
-        return np.concatenate([every[: self.horizon], every[-SLACKS:], every[self.horizon : -SLACKS]])
+        return np.concatenate(
+            [every[: self.horizon], every[-SLACKS:], every[self.horizon : -SLACKS]]
+        )
 
     @cached_property
     def workspace(self) -> Workspace:
