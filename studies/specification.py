@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from controllers import CONTROLLERS
+from controllers.design_file import methods_of
 from controllers.spec import replaced
 from linearize.axes import stroke_m
 from linearize.standard import SHIFT_MODES, SLIDE_MODES
@@ -35,7 +36,7 @@ from studies.scenarios import SCENARIOS
 from studies.shift_check import SHIFTS
 from studies.text import number, until
 from workbench.closed_loop import LoopRecord
-from workbench.errors import InputError, Message, listed
+from workbench.errors import InputError, Message, listed, nearest
 from workbench.plant import Plant, require
 from workbench.rig import Rig
 from workbench.rig_text import RigText, read_text
@@ -139,7 +140,7 @@ def read_specification(
     require(chosen, judged, "the list of scenarios")
     content, path = read_text(path_or_text)
     text = RigText(content, str(path) if path else "spec", "a specification")
-    _top_keys(text, lines, rig.plant.name)
+    _top_keys(text, lines, rig.plant)
     asked = [*_figures(text, rig, lines, judged), *_limits(text, rig, tuple(judged))]
     for line in asked:
         if not set(chosen) & set(line.scenarios):
@@ -164,21 +165,26 @@ def _known(plant: Plant) -> tuple[Mapping[str, str], dict[str, bool]]:
     raise InputError(Message(f"{plant.name} has no standard modes to control", expected=expected))
 
 
-def _top_keys(text: RigText, lines: Mapping[str, str], plant: str) -> None:
+def _top_keys(text: RigText, lines: Mapping[str, str], plant: Plant) -> None:
     known = (*lines, LIMITS, *CONTROLLERS)
-    deeper = [
-        f"{name}.{number}" for name, found in CONTROLLERS.items() for number in _names(found.spec())
-    ]
-    expected = f"one of {listed(known, len(known))}"
     for key in text.tree:
         if key in ALL_LINES and key not in known:
-            judging = (*lines, LIMITS)
-            text.wrong(
-                (key,), f"{plant} is not judged by it", expected=f"one of {listed(judging, 99)}"
-            )
+            expected = f"one of {listed((*lines, LIMITS), 99)}"
+            text.wrong((key,), f"{plant.name} is not judged by it", expected=expected)
         elif key not in known:
+            numbers = _numbers_called(key, known, plant)
+            expected = f"a number of a controller in its table: {listed(numbers)}"
+            expected = expected if numbers else f"one of {listed(known, len(known))}"
             what = f"{text.kind} has no such name"
-            text.wrong((key,), what, expected=expected, known=(*known, *deeper))
+            text.wrong((key,), what, expected=expected, known=numbers or known)
+
+
+def _numbers_called(key: str, known: Iterable[str], plant: Plant) -> list[str]:
+    """Numbers of the plant's controllers whose last name is most like a key; none if a known is."""
+    numbers = [f"{m}.{name}" for m in methods_of(plant) for name in _names(CONTROLLERS[m].spec())]
+    last = [name.rpartition(".")[2] for name in numbers]
+    near = nearest(key, (*known, *last))
+    return [whole for whole, end in zip(numbers, last, strict=True) if end == near]
 
 
 def _names(spec: Any, before: str = "") -> Iterator[str]:

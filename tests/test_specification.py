@@ -219,6 +219,21 @@ def test_all_that_is_wrong_is_said_at_once_by_line_with_what_was_expected_and_th
 
 
 @pytest.mark.parametrize(
+    ("typed", "numbers"),
+    [
+        ("bandwidth_hz", "axis-pid.tuning.bandwidth_hz, cascade.bandwidth_hz"),
+        ("phase_margin", "axis-pid.tuning.phase_margin_rad"),
+    ],
+)
+def test_a_number_of_a_controller_above_the_tables_is_told_where_it_stands(typed, numbers):
+    (line,) = said(f"{typed} = 1.0")
+
+    assert sorted(numbers.split(", ")) == sorted(
+        line.partition("in its table: ")[2].partition(";")[0].split(", ")
+    )
+
+
+@pytest.mark.parametrize(
     ("text", "expected"),
     [
         ('air = "1 g"\nair = "2 g"', "spec:2: air: stands here a second time"),

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from linearize.shifting import POSITION
-from studies.figures.style import COLUMN_IN, GREY, literal, look, new_figure
+from studies.figures.style import COLUMN_IN, GREEN, GREY, literal, look, new_figure
 from studies.shift_check import OPEN_LOOP, SETTLED_M, ShiftCheck
 from workbench.plants.gearbox import COMMANDS
 
@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from workbench.closed_loop import LoopRecord
+
+SETTLED = {"color": GREEN, "alpha": 0.4, "linewidth": 0.0, "label": "settled"}
 
 
 def shift_figures(found: ShiftCheck) -> dict[str, Figure]:
@@ -35,7 +37,7 @@ def shift_figures(found: ShiftCheck) -> dict[str, Figure]:
                 axes.step(time_ms, recording[command], where="post", **line)
         target_mm = 1e3 * recording[f"reference.{POSITION}"][-1]
         band_mm = 1e3 * SETTLED_M
-        place.axhspan(target_mm - band_mm, target_mm + band_mm, color="0.8", label="settled")
+        place.axhspan(target_mm - band_mm, target_mm + band_mm, **SETTLED)
         place.set_ylabel("main piston (mm)")
         for axes, label in zip(valves, ("valve 1", "valve 2"), strict=True):
             axes.set(ylabel=label, ylim=(-0.2, 1.2), yticks=(0, 1))
