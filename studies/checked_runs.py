@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -22,6 +23,7 @@ from studies.kept import Row
 from studies.many_runs import Setup, closed, read, rows_of
 from studies.robustness import Line, Robustness
 from studies.shift_check import Shift, ShiftCheck
+from studies.slow_calls import slow_calls
 from studies.specification import Specification
 from studies.stayed_away import stayed_away
 from studies.verdicts import Figures, Judged, Verdict, judge
@@ -292,4 +294,6 @@ def check_rig(
     found = CheckedRuns(setup, tuple(rows), spec if asked else None)
     if found.lost and not found.several:
         raise ArithmeticError(found.lost[0].said)
+    for said in slow_calls(setup.loops, found.found):
+        warnings.warn(said, stacklevel=2)
     return found

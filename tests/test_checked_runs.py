@@ -186,3 +186,20 @@ def test_of_several_runs_those_whose_step_never_rose_are_counted(lq, monkeypatch
     heavy = sum(drawn_plant(RIG, k).values[MASS] > RIG.plant.values[MASS] for k in range(9))
 
     assert found.unreached == (f"step in {heavy} of 9 runs",)
+
+
+@pytest.mark.parametrize(("call_s", "told"), [(1.9e-3, 0), (2.1e-3, 1)])
+def test_a_control_that_takes_longer_than_its_sample_is_told(
+    lq, monkeypatch, recwarn, call_s, told
+):
+    def timed(loops, plant, seed):
+        return Check((metrics(solve_median_s=call_s),), (record(),))
+
+    monkeypatch.setattr(Loops, "once", timed)
+    check_rig(RIG, lq, ["ekf"], ["step"])
+    said = [str(each.message) for each in recwarn if "longer than its sample" in str(each.message)]
+
+    assert (
+        said
+        == ["a call of the controller takes 2.1 ms here, longer than its sample of 2 ms"][:told]
+    )
