@@ -38,10 +38,12 @@ def position_steps(limits: Limits, share: float, dwell_s: float) -> Play:
 
 
 def position_triangle(limits: Limits, share: float, period_s: float) -> Play:
-    """There and back at one speed."""
+    """There and back at one speed, in a longer time where the axes were recorded slower."""
     slowest = max(period_s, 2.0 * _move_s(limits))
     phase = np.maximum(limits.time_s - LEAD_S, 0.0) / slowest
-    return followed(limits, zigzag(phase), share)
+    play = followed(limits, zigzag(phase), share)
+    words = f"a triangle as fast as was recorded, {slowest:.2g} s there and back"
+    return replace(play, words=words) if slowest > period_s else play
 
 
 def position_multisine(limits: Limits, share: float) -> Play:
