@@ -9,7 +9,7 @@ from workbench.fitting.gauss_newton import fit_windows
 from workbench.fitting.noise import measured_noise
 from workbench.fitting.unknowns import nominal_unknowns
 from workbench.fitting.windows import cut_windows
-from workbench.manoeuvres.library import command_ramp, position_triangle
+from workbench.manoeuvres.library import command_ramp, fill_and_hold, position_triangle
 from workbench.manoeuvres.limits import limits_of
 from workbench.manoeuvres.play import Play
 from workbench.manoeuvres.rehearse import rehearse, speed_maps
@@ -90,3 +90,16 @@ def test_a_triangle_slower_than_its_name_says_how_slow_it_is():
 
     assert fast.words == "a triangle as fast as was recorded, 6.3 s there and back"
     assert not slow.words
+
+
+@pytest.mark.parametrize("sample_time_s", [1e-3, 2.5e-4])
+def test_what_fills_and_vents_does_both_where_samples_make_it_short(sample_time_s):
+    """Twenty thousand samples at 4 kHz are 5 s."""
+    plant = default_rig("servo_reservoir").plant
+    names = (*plant.measured, *(s.name for s in (*plant.commands, *plant.measured_inputs)))
+    channels = {name: np.linspace(1.0, 5.0, 4000) for name in names}
+    limits = limits_of(plant, [Recording("fast", sample_time_s, channels)])
+    (command,) = fill_and_hold(limits, 1.0).commands
+
+    assert (command.min(), command.max()) == (limits.commands[0].lower, limits.commands[0].upper)
+    assert command[0] == command[-1] == limits.commands[0].nominal

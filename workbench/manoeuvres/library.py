@@ -119,9 +119,9 @@ def command_multisine(limits: Limits, share: float, size: float) -> Play:
 
 
 def fill_and_hold(limits: Limits, share: float) -> Play:
-    """Fill for a second and shut, vent for a second and shut."""
-    time_s = limits.time_s
-    fills, vents = (time_s > 0.5) & (time_s < 1.5), (time_s > 6.0) & (time_s < 7.0)
+    """Fill for a tenth of the time and shut, vent as long and shut: a second each of ten."""
+    tenths = 10.0 * limits.time_s / (limits.sample_time_s * limits.samples)
+    fills, vents = (tenths > 0.5) & (tenths < 1.5), (tenths > 6.0) & (tenths < 7.0)
     return commanded(limits, share * (1.0 * fills - 1.0 * vents))
 
 
