@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from math import isfinite, nan
+from math import inf, isfinite, nan
 from textwrap import fill
 
 from studies.documents import Document
@@ -71,6 +71,8 @@ def known_procedure(name: str, tank: str | None = None) -> Procedure:
         volume_m3 = quantity(tank, "tank_volume_m3")
     except UnitError as error:
         raise InputError(Message(str(error), "--tank")) from error
+    if not 0.0 < volume_m3 < inf:
+        raise InputError(Message(f"{tank!r} is no volume of a tank", "--tank", "one above zero"))
     return replace(found, run=partial(found.run, tank_volume_m3=volume_m3))
 
 

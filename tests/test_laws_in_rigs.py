@@ -128,6 +128,15 @@ def test_a_fit_moves_a_law_and_tells_where_it_was_seen_then(lawful):
     assert f"{CURVED}.curved_n_m2" in [row.name for row in found.rows]
 
 
+def test_a_fit_that_leaves_a_law_as_it_is_leaves_its_range_too(lawful):
+    narrow = curved(5, 3e5, wider=0.5)
+    alone = fit(lawful.rig, [narrow], only=("atmosphere.pressure_pa",))
+    both = fit(lawful.rig, [narrow])
+
+    assert alone.rig.seen == lawful.rig.seen
+    assert both.rig.seen["rod.position_m"] == pytest.approx((-0.015, 0.015), abs=1e-4)
+
+
 def test_a_law_can_be_added_by_name_and_as_a_whole(rig):
     train, held_out = [curved(1), curved(3, 1e5)], [curved(2, 4e5)]
     one, whole = add(rig, CURVED, train, held_out), add_law(rig, train, held_out)

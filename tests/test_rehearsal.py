@@ -9,13 +9,13 @@ from workbench.fitting.gauss_newton import fit_windows
 from workbench.fitting.noise import measured_noise
 from workbench.fitting.unknowns import nominal_unknowns
 from workbench.fitting.windows import cut_windows
-from workbench.manoeuvres.library import command_ramp, position_triangle
+from workbench.manoeuvres.library import command_ramp, fill_and_hold, position_triangle
 from workbench.manoeuvres.limits import limits_of
 from workbench.manoeuvres.play import Play
 from workbench.manoeuvres.rehearse import rehearse, speed_maps
 from workbench.reading import read_recording
 from workbench.recording import Recording
-from workbench.rig import load_rig
+from workbench.rig import default_rig, load_rig
 
 PLACE, COMMAND = "slide.position_m", "valve.command_v"
 A, B = "chamber_a.pressure_pa", "chamber_b.pressure_pa"
@@ -77,3 +77,29 @@ def test_the_speed_map_goes_both_ways_where_the_recording_begins_at_a_stop(fit):
     (speeds,) = speed_maps(fit, limits_between(fit, 0.0, 0.08, 0.0))
 
     assert speeds.speed[0] < -0.1 and speeds.speed[-1] > 0.1
+
+
+def test_a_triangle_slower_than_its_name_says_how_slow_it_is():
+    """1 s there and back through 200 mm is 0.4 m/s; recorded were 0.1 m/s."""
+    plant = default_rig("servo_drive").plant
+    place = 0.15 + 0.1 * np.sin(np.arange(0.0, 6.3, 1e-3))
+    channels = {name: np.full(len(place), 4e5) for name in plant.measured}
+    channels |= {"slide.position_m": place, "valve.command_v": np.full(len(place), 5.0)}
+    limits = limits_of(plant, [Recording("slow", 1e-3, channels)])
+    fast, slow = (position_triangle(limits, 1.0, period_s) for period_s in (1.0, 9.0))
+
+    assert fast.words == "a triangle as fast as was recorded, 6.3 s there and back"
+    assert not slow.words
+
+
+@pytest.mark.parametrize("sample_time_s", [1e-3, 2.5e-4])
+def test_what_fills_and_vents_does_both_where_samples_make_it_short(sample_time_s):
+    """Twenty thousand samples at 4 kHz are 5 s."""
+    plant = default_rig("servo_reservoir").plant
+    names = (*plant.measured, *(s.name for s in (*plant.commands, *plant.measured_inputs)))
+    channels = {name: np.linspace(1.0, 5.0, 4000) for name in names}
+    limits = limits_of(plant, [Recording("fast", sample_time_s, channels)])
+    (command,) = fill_and_hold(limits, 1.0).commands
+
+    assert (command.min(), command.max()) == (limits.commands[0].lower, limits.commands[0].upper)
+    assert command[0] == command[-1] == limits.commands[0].nominal

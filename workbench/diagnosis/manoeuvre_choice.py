@@ -95,7 +95,7 @@ def asked_for(
     how = "its reference followed by a position loop" if looped else "its commands played"
     length_s = limits.sample_time_s * limits.samples
     return NextRecording(
-        what=f"{best.manoeuvre.words}, {length_s:.3g} s, {how}",
+        what=f"{best.play.words or best.manoeuvre.words}, {length_s:.3g} s, {how}",
         separates=tuple(plants),
         expected_gain=gain,
         alike=alike,

@@ -12,7 +12,7 @@ from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.linearised import Normal, normal_equations, rescaled
 from workbench.law_range import seen_in
 from workbench.rig import Rig
-from workbench.rig_laws import laws_of
+from workbench.rig_laws import Ranges, laws_of
 
 FLAT = 0.98  # posterior over prior deviation: the recording says nothing of the parameter
 FAR_MOVED = 2.0  # prior deviations: what moves more is worth a word
@@ -81,10 +81,7 @@ def _normal(fit: Fit) -> Normal:
 
 
 def fitted_rig(rig: Rig, fit: Fit, added: Sequence[str] = ()) -> Rig:
-    """The rig at fitted values with their standard deviations.
-
-    Empirical terms were seen where the fitted recordings went.
-    """
+    """The rig at fitted values with their standard deviations, and where its law was seen."""
     ours = rig.plant.values
     found = fit.unknowns.values(fit.point.t)
     values = {name: value for name, value in found.items() if name in ours}
@@ -92,8 +89,18 @@ def fitted_rig(rig: Rig, fit: Fit, added: Sequence[str] = ()) -> Rig:
     return replace(
         rig.with_added(rig.plant.with_values(values), added),
         deviations={**rig.deviations, **{n: d for n, d in deviations.items() if d > 0}},
-        seen=seen_in(rig.plant, fit.windows.recordings) if laws_of(rig.plant) else {},
+        seen=_seen(rig, fit),
     )
+
+
+def _seen(rig: Rig, fit: Fit) -> Ranges:
+    """Where the empirical law of a rig was seen: where the recordings go that it was fitted to.
+
+    A fit that leaves all terms as they are, such as one of the mass alone, tells nothing of them.
+    """
+    laws = laws_of(rig.plant)
+    moved = any(name.startswith(f"{law.name}.") for law in laws for name in fit.unknowns.names)
+    return seen_in(rig.plant, fit.windows.recordings) if moved else rig.seen
 
 
 def strained(fit: Fit) -> tuple[Moved, ...]:

@@ -27,6 +27,7 @@ from workbench.errors import InputError, Message, likest_first, listed
 from workbench.identification.held_gas import (
     STILL_M,
     geometry,
+    held_position_m,
     position_channel,
     pressed_chamber,
 )
@@ -171,7 +172,8 @@ def _volumes(
     deviation = total * GAUGE_ERROR * SPAN_PA * float(np.linalg.norm(slopes)) / np.sqrt(12.0)
     dead = f"{chamber.name}.dead_volume_m3"
     changed = 1.0 + plant.values.get(f"{chamber.name}.dead_volume_change", 0.0)
-    swept = geometry(plant, chamber, recording)[0] - changed * plant.values[dead]
+    volume, _ = geometry(plant, chamber, held_position_m(chamber, recording))
+    swept = volume - changed * plant.values[dead]
     return (
         Estimate(f"{chamber.name}.total_volume_m3", total, deviation),
         Estimate(dead, (total - swept) / changed, deviation / changed),

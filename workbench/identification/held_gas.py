@@ -41,19 +41,20 @@ def position_channel(chamber: Chamber) -> str:
     return f"{chamber.body}.position_m"
 
 
-def geometry(plant: Plant, chamber: Chamber | Vessel, recording: Recording) -> tuple[float, float]:
-    """Volume and surface of the wall at the end of a recording, as the plant has them."""
+def geometry(plant: Plant, chamber: Chamber | Vessel, position_m: float) -> tuple[float, float]:
+    """Volume and surface of the wall with the piston in a place, as the plant has them."""
     names = [f"{chamber.name}.volume_m3", f"{chamber.name}.surface_m2"]
     x = plant.initial.copy()
     if isinstance(chamber, Chamber):
-        at = list(plant.state_list).index(position_channel(chamber))
-        x[at] = held_position_m(chamber, recording)
+        x[list(plant.state_list).index(position_channel(chamber))] = position_m
     volume, surface = plant.model.quantities(*names)(x, *plant.nominal).full().ravel()
     return float(volume), float(surface)
 
 
-def held_position_m(chamber: Chamber, recording: Recording) -> float:
-    """Where the piston rests at the end: the mean of the last tenth."""
+def held_position_m(chamber: Chamber | Vessel, recording: Recording) -> float:
+    """Where the piston rests at the end: the mean of the last tenth; NaN of a vessel."""
+    if isinstance(chamber, Vessel):
+        return float("nan")
     position = recording[position_channel(chamber)]
     return float(np.nanmean(position[-max(len(position) // 10, 1) :]))
 

@@ -50,9 +50,12 @@ from workbench.plant import Plant
 from workbench.recording import Recording
 from workbench.rig import Rig
 
+BEFORE = 5  # samples at the start, before the push
 LATER_S = 0.02  # after the stop: sensors and the piston have come to rest
 LEAST_NOISE = 10.0  # noise deviations that the pressure must decay by
 LEAST_TIME_CONSTANTS = 3.0
+MOST_HEATED = 2.0  # temperature behind the stop over that of the wall, or the inverse
+MOST_LOST = 0.3  # of the gas: more is no leak of a plugged chamber
 TYPICAL_LEAK_M2 = 1e-9
 
 
@@ -65,12 +68,17 @@ class WallHeatFit(Identified):
 
 @dataclass(frozen=True)
 class _Decay:
-    """One decay: the pressure from the stop on, and the vessel it happens in."""
+    """One decay: the pressure from the stop on, and the vessel it happens in.
+
+    ``kept`` is the gas that is there at the end over that before the push, both at the temperature
+    of the wall; 1 where no piston moves.
+    """
 
     recording: Recording
     vessel: Plant
     channel: str
     noise: float
+    kept: float
 
 
 def wall_heat(rig: Rig, recordings: Sequence[Recording]) -> WallHeatFit:
@@ -86,6 +94,8 @@ def wall_heat(rig: Rig, recordings: Sequence[Recording]) -> WallHeatFit:
     plant = rig.fit_for(recordings[0])
     decays = [_decay(plant, each) for each in recordings]
     _check_volumes(rig, decays)
+    for each in decays:
+        _check_plugged(each)
     tops = [_exponential(each) for each in decays]
     name = _coefficient(decays[0].vessel)
     fits = [_fitted(each, name) for each in decays]
@@ -106,14 +116,37 @@ def _check_volumes(rig: Rig, decays: Sequence[_Decay]) -> None:
     known_before(rig, sorted(dead & set(rig.plant.values)), "dead-volume", why)
 
 
+def _check_plugged(decay: _Decay) -> None:
+    """Refuse what a valve fills or empties: that comes to rest like an exponential too.
+
+    The gas of a plugged chamber stays there, and its pressure falls or rises by its temperature
+    alone.
+    """
+    measured = decay.recording[decay.channel]
+    n = max(len(measured) // 20, 1)
+    first, last = float(measured[0]), float(measured[-n:].mean())
+    if abs(decay.kept - 1.0) > MOST_LOST:
+        what = f"{decay.kept:.0%} of the gas before the push is there at the end"
+    elif not 1.0 / MOST_HEATED < first / last < MOST_HEATED:
+        what = f"{first / 1e5:.2g} bar that come to {last / 1e5:.2g} bar are more than heat does"
+    else:
+        return
+    expected = "both ports of the chamber plugged, so that its gas stays"
+    raise unfit(decay.recording, f"is no thermal decay: {what}", expected)
+
+
 def _decay(plant: Plant, recording: Recording) -> _Decay:
     """The part of a recording after the push, checked."""
     chamber = pressed_chamber(plant, recording)
     channel = f"{chamber.name}.pressure_pa"
     noise = measured_noise([recording], [channel])[channel]
-    first = 0
+    first, held_m = 0, held_position_m(chamber, recording)
+    volume, surface = geometry(plant, chamber, held_m)
+    begun_m3 = volume
     if isinstance(chamber, Chamber):
-        away_m = np.abs(recording[position_channel(chamber)] - held_position_m(chamber, recording))
+        position = recording[position_channel(chamber)]
+        away_m = np.abs(position - held_m)
+        begun_m3, _ = geometry(plant, chamber, float(position[0]))
         moving = np.flatnonzero(away_m > STILL_M)
         expected = "a piston pushed quickly and then held, both ports of its chamber plugged"
         if not len(moving):
@@ -127,8 +160,9 @@ def _decay(plant: Plant, recording: Recording) -> _Decay:
         what = f"is no thermal decay: {chamber.name} moves by {fallen_pa / 1e5:.2g} bar after it"
         expected = f"a decay of at least {LEAST_NOISE * noise / 1e5:.2g} bar, logged to its end"
         raise unfit(recording, what, expected)
-    vessel = plugged(plant, chamber, *geometry(plant, chamber, recording))
-    return _Decay(rest, vessel, channel, noise)
+    before_pa, end_pa = float(np.mean(recording[channel][:BEFORE])), float(np.mean(pressure[-n:]))
+    kept = 1.0 if volume == begun_m3 else end_pa * volume / (before_pa * begun_m3)
+    return _Decay(rest, plugged(plant, chamber, volume, surface), channel, noise, kept)
 
 
 def _exponential(decay: _Decay) -> Solution:

@@ -38,10 +38,12 @@ def position_steps(limits: Limits, share: float, dwell_s: float) -> Play:
 
 
 def position_triangle(limits: Limits, share: float, period_s: float) -> Play:
-    """There and back at one speed."""
+    """There and back at one speed, in a longer time where the axes were recorded slower."""
     slowest = max(period_s, 2.0 * _move_s(limits))
     phase = np.maximum(limits.time_s - LEAD_S, 0.0) / slowest
-    return followed(limits, zigzag(phase), share)
+    play = followed(limits, zigzag(phase), share)
+    words = f"a triangle as fast as was recorded, {slowest:.2g} s there and back"
+    return replace(play, words=words) if slowest > period_s else play
 
 
 def position_multisine(limits: Limits, share: float) -> Play:
@@ -117,9 +119,9 @@ def command_multisine(limits: Limits, share: float, size: float) -> Play:
 
 
 def fill_and_hold(limits: Limits, share: float) -> Play:
-    """Fill for a second and shut, vent for a second and shut."""
-    time_s = limits.time_s
-    fills, vents = (time_s > 0.5) & (time_s < 1.5), (time_s > 6.0) & (time_s < 7.0)
+    """Fill for a tenth of the time and shut, vent as long and shut: a second each of ten."""
+    tenths = 10.0 * limits.time_s / (limits.sample_time_s * limits.samples)
+    fills, vents = (tenths > 0.5) & (tenths < 1.5), (tenths > 6.0) & (tenths < 7.0)
     return commanded(limits, share * (1.0 * fills - 1.0 * vents))
 
 

@@ -23,10 +23,13 @@ class Play:
         Shape (n_u, n); NaN where a position loop is to give them.
     reference
         Of each axis, shape (n_axes, n), in SI.
+    words
+        What a person does, where the limits do not let it be what its manoeuvre says.
     """
 
     commands: np.ndarray
     reference: np.ndarray
+    words: str = ""
 
     @property
     def looped(self) -> bool:
