@@ -49,6 +49,14 @@ def test_nothing_is_said_of_good_recordings(demo):
     assert [said(rig, each) for each in recordings] == [[], []]
 
 
+@pytest.mark.parametrize(("first", "samples"), [(0, 300), (1500, 300), (7500, 300), (1500, 500)])
+def test_nothing_is_said_of_a_stroke_that_a_misreading_happens_to_fit(demo, first, samples):
+    """One window or two: an effect is missing, and one atmosphere less explains these better."""
+    rig, train, _ = demo
+
+    assert said(rig, train.part(first, first + samples)) == []
+
+
 @pytest.mark.skipif(FOLDER is None, reason="the real recordings are not beside the project")
 @pytest.mark.filterwarnings("ignore::workbench.reading.RecordingWarning")
 @pytest.mark.parametrize("data", RECORDINGS, ids=lambda data: data.__name__.rpartition(".")[2])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from studies.documents import comparison_document
-from studies.figures.comparison import comparison_figures
+from studies.figures.comparison import comparison_figures, overlay_figure
 from studies.figures.style import save
 from studies.text_of_comparison import comparison_text
 from workbench.comparison import compare
@@ -181,6 +181,8 @@ def test_a_plant_without_states_is_compared_sample_by_sample():
     found = compare(bench, [Recording("bench", DT, channels)]).recordings[0]
 
     assert set(found.errors) == {PLAIN}
+    assert "worst windows shaded" in overlay_figure(found).get_suptitle()
+    assert "shaded" not in overlay_figure(replace(found, worst=())).get_suptitle()
 
 
 def test_a_run_without_the_command_is_refused(drive):

@@ -142,3 +142,18 @@ def test_an_effect_on_a_body_that_is_not_there_is_refused(tmp_path):
 
     with pytest.raises(InputError, match=r"the plant has no 'slde'.*in line \d+"):
         plant_named("my_plant.py:joint", tmp_path)
+
+
+def test_nothing_is_named_of_a_single_stroke(folder):
+    """Some effect makes up for any one window, and another manoeuvre may even agree."""
+    short, found = folder / "short.csv", folder / "short.json"
+    lines = (folder / "train.csv").read_text().splitlines(keepends=True)
+    short.write_text("".join(lines[:701]))
+    held_out = folder / "validation.csv"
+    answer = call("diagnose", folder / "rig.toml", short, "--validate", held_out, "--json", found)
+    assert answer.exit_code == 0, answer.output
+    said = json.loads(found.read_text())
+
+    assert said["verdict"] == "recording_too_weak" and said["effect"] is None
+    assert said["sentence"].endswith("s were fitted, too little to tell what is missing")
+    assert said["after"]["train"] == {} and said["next_recording"]["what"]

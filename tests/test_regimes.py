@@ -85,6 +85,31 @@ def test_a_leak_is_choked_above_the_critical_pressure():
     assert not any(name.startswith("chamber leak into") for name in found)
 
 
+def test_a_valve_carries_flow_one_way_at_a_time():
+    """A spool leaks into and out of a chamber at once; of small openings that is a large share."""
+    command = held((4.95, 300), (5.45, 300), (4.45, 300))
+    found = regimes(PLANTS["servo_drive"](), drive(command, np.full(900, 0.1)))
+
+    def carries(way):
+        return sum(each for name, each in found.items() if name.startswith(f"valve {way}"))
+
+    for chamber in ("chamber a", "chamber b"):
+        assert not np.any((carries(f"into {chamber}") > 0) & (carries(f"out of {chamber}") > 0))
+    assert found["valve into chamber a subsonic"][300:600].all()
+    assert found["valve out of chamber b choked"][300:600].all()
+    assert not np.any(carries("into chamber a")[:300])
+
+
+def test_a_valve_without_limits_is_not_always_near_null():
+    plant = PLANTS["servo_drive"]()
+    (valve,) = plant.commands
+    boundless = replace(plant, commands=(replace(valve, lower=-np.inf, upper=np.inf),))
+    found = regimes(boundless, drive(held((4.95, 300), (8.0, 300)), np.full(600, 0.1)))
+
+    assert found["valve open above 4.95 V"][300:].all()
+    assert "valve near null" not in found
+
+
 def test_a_path_of_the_iso_law_is_choked_below_its_own_critical_ratio():
     """A tank is filled from 7 bar through the valve with b = 0.35."""
     pressure_pa = np.linspace(1.1e5, 6.5e5, 600)

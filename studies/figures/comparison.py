@@ -56,7 +56,7 @@ def comparison_figures(found: Comparison, prefix: str = "") -> dict[str, Figure]
 
 
 def overlay_figure(each: RecordingComparison) -> Figure:
-    """Every output measured and simulated with the error beneath; the worst windows shaded."""
+    """Every output measured and simulated with the error beneath; worst windows shaded, if any."""
     names = list(each.measured)
     across = ceil(len(names) / IN_A_COLUMN)
     down = ceil(len(names) / across)
@@ -78,7 +78,8 @@ def overlay_figure(each: RecordingComparison) -> Figure:
             if k + across >= len(names):
                 lower.set_xlabel("time (s)")
                 lower.tick_params(labelbottom=True)
-        title = f"{each.name}: measured, simulated and error, worst windows shaded"
+        shaded = ", worst windows shaded" if each.worst else ""
+        title = f"{each.name}: measured, simulated and error{shaded}"
         figure.suptitle(headline(title, PAGE_IN), fontsize=8)
         handles, labels = panels[0, 0].get_legend_handles_labels()
         more, words = panels[1, 0].get_legend_handles_labels()

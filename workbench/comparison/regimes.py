@@ -117,7 +117,7 @@ def _sides(signal: Signal, away: np.ndarray, valve: bool) -> dict[str, np.ndarra
     sides = {f"above {centre}": away > closed, f"below {centre}": away < -closed}
     if not valve:
         return {f"{member} {side}": samples for side, samples in sides.items()}
-    near = (np.abs(away) > closed) & (np.abs(away) <= NEAR_NULL_SHARE * span)
+    near = (np.abs(away) > closed) & (np.abs(away) <= NEAR_NULL_SHARE / OPEN_SHARE * closed)
     return {
         f"{member} closed": np.abs(away) <= closed,
         f"{member} near null": near,
@@ -133,16 +133,26 @@ def _moves_gas(plant: Plant, signal: Signal) -> bool:
 
 
 def _flows(course: Course) -> dict[str, np.ndarray]:
-    """Choked or subsonic, for each path and direction while it carries flow."""
+    """Choked or subsonic, for each path and direction while it carries flow.
+
+    A valve that leaks or is underlapped fills and vents a chamber at once: it carries flow the way
+    of what both leave, and where they cancel, none.
+    """
     paths = course.plant.model.paths
     flows = course.along(*(path.flow_kg_s for path in paths))
     shares_of_choked = course.along(*(path.choked_share for path in paths))
     if not flows.size:
         return {}
     least = CARRYING_SHARE * float(np.nanmax(np.abs(flows)))
+    net: dict[tuple[str, str], np.ndarray] = {}
+    for path, flow in zip(paths, flows, strict=True):
+        ends = (path.effect, path.balance)
+        net[ends] = net.get(ends, np.zeros(len(flow))) + flow
     found: dict[str, np.ndarray] = {}
     for path, flow, share in zip(paths, flows, shares_of_choked, strict=True):
-        for way, carrying in (("into", flow > least), ("out of", flow < -least)):
+        left = net[path.effect, path.balance]
+        for way, sign in (("into", 1.0), ("out of", -1.0)):
+            carrying = (sign * flow > least) & (sign * left > least)
             name = f"{path.effect} {way} {path.balance}"
             for state, holds in (("choked", share >= CHOKED), ("subsonic", share < CHOKED)):
                 key = f"{name} {state}"

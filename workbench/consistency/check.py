@@ -25,6 +25,7 @@ from workbench.consistency.misreadings import Misreading, misreadings
 from workbench.consistency.sensors import beyond_stops, noisy, stuck, uneven_clock
 from workbench.errors import InputError
 from workbench.fitting.problem import staged
+from workbench.fitting.window_length import moves as has_motion
 from workbench.plant import Plant
 from workbench.reading.table import RecordingWarning
 from workbench.recording import Recording
@@ -36,6 +37,7 @@ SUSPECT_GAIN = 1.6  # what is unexplained as read, over the same read in another
 CERTAIN_GAIN = 2.0
 CONCERNED = 3  # outputs that a misreading concerns: more do not water it down, fewer weigh less
 FIRST_LOOK = 4  # windows, for all misreadings
+FEWEST_WINDOWS = 3  # of a plant that moves: some misreading fits any one or two strokes better
 FOLLOWED = 3  # misreadings that are looked at in all windows
 EXPLAINS = 1.3  # unexplained at the most, read in another way: noise fits some way best, but none
 AS_GOOD = 1.25  # another misreading that leaves no more than so many times the least is named too
@@ -114,11 +116,12 @@ def _misread(
     plant: Plant, recording: Recording, where: Probe, before: np.ndarray, moves: np.ndarray
 ) -> list[Finding]:
     """The misreading that explains the recording best, if it does so by far."""
-    ways = misreadings(plant, recording)
+    few = len(where.firsts) < FEWEST_WINDOWS and has_motion(plant)
+    ways = [] if few else misreadings(plant, recording)
     if not ways:
         return []
-    few = replace(where, firsts=where.firsts[:: max(len(where.firsts) // FIRST_LOOK, 1)])
-    rough = _mean(unexplained(plant, [way.undone(recording) for way in ways], few)[:, moves])
+    some = replace(where, firsts=where.firsts[:: max(len(where.firsts) // FIRST_LOOK, 1)])
+    rough = _mean(unexplained(plant, [way.undone(recording) for way in ways], some)[:, moves])
     ways = [ways[k] for k in np.argsort(rough, kind="stable")[:FOLLOWED]]
     after = unexplained(plant, [way.undone(recording) for way in ways], where)[:, moves]
     means = np.where(

@@ -19,7 +19,12 @@ MOST_UNEXPLAINED = 0.9  # error over motion, of every output, by the fit that a 
 
 
 def credible(found: Diagnosis, doubts: Sequence[Finding]) -> Diagnosis:
-    """The same diagnosis, with the verdict that the recordings allow."""
+    """The same diagnosis, with the verdict that the recordings allow.
+
+    What was fitted to too little says nothing, and no more of whether rig and recording agree.
+    """
+    if found.contradicted:
+        return found
     missed = _missed(found)
     if missed:
         listed = ", ".join(f"{public_name(name)} {share:.2g}" for name, share in missed.items())

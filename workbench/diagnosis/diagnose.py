@@ -27,7 +27,15 @@ from workbench.diagnosis.law import better_base, empirical_law, standing
 from workbench.diagnosis.next_recording import recommended
 from workbench.diagnosis.pairs import with_pairs
 from workbench.diagnosis.ranking import ranked
-from workbench.diagnosis.result import NAMING, Diagnosis, Evidence, Law, Ranked, Where
+from workbench.diagnosis.result import (
+    NAMING,
+    Diagnosis,
+    Evidence,
+    Law,
+    Ranked,
+    Verdict,
+    Where,
+)
 from workbench.diagnosis.scan import Profile
 from workbench.diagnosis.settle import with_settled_sizes
 from workbench.diagnosis.verdict import (
@@ -35,6 +43,8 @@ from workbench.diagnosis.verdict import (
     held,
     judged,
     sentence,
+    too_short,
+    too_short_text,
     unexplained,
     unsteady,
 )
@@ -175,6 +185,9 @@ def _concluded(
     problem, ranking, law = found.problem, found.ranking, found.law
     far = far_above_noise(problem.base_validation)
     verdict = judged(ranking, law, evidence.strong, far)
+    short = too_short(problem.base) and (law is not None or verdict in NAMING)
+    if short:
+        verdict, law = Verdict.RECORDING_TOO_WEAK, None
     if verdict in NAMING or (ranking and ranking[0].accepted):
         progress("sizes of what is named")
         ranking = with_settled_sizes(problem, ranking)
@@ -188,7 +201,9 @@ def _concluded(
     return Diagnosis(
         rig_name=rig_name,
         verdict=verdict,
-        sentence=sentence(verdict, ranking, law, evidence),
+        sentence=too_short_text(problem.base)
+        if short
+        else sentence(verdict, ranking, law, evidence),
         ranking=ranking,
         where=where,
         before=errors_of(problem.base, problem.base_validation),
@@ -199,5 +214,6 @@ def _concluded(
         base_validation=problem.base_validation,
         next_recording=recommended(problem, verdict, ranking, progress),
         evidence=evidence,
+        contradicted=short,
         strained=strained(problem.base),
     )

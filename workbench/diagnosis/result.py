@@ -264,8 +264,8 @@ class Diagnosis:
     ``base`` is the prior fit without any addition, ``base_validation`` the same on held-out data.
     ``evidence`` says what that data is worth.
     ``next_recording`` is there where the verdict leaves a question open.
-    ``contradicted`` is True where recording and rig contradict each other: whatever the ranking
-    accepts then is no effect to be added.
+    ``contradicted`` is True where recording and rig contradict each other, or hardly anything was
+    fitted: whatever the ranking accepts then is no effect to be added.
     ``strained`` are parameters that the prior fit takes far from what is known of them: suspects.
     """
 

@@ -12,10 +12,12 @@ from workbench.fitting.errors import errors_of
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.posterior import held_back
 from workbench.fitting.problem import BELIEVED
+from workbench.fitting.window_length import moves
 from workbench.units import public_name
 
 FAR_ABOVE_NOISE = 3.0  # RMSE over noise that is worth a word where nothing is named
 UNEXPLAINED = "unexplained errors remain on held-out windows"
+FEWEST_WINDOWS = 2  # fitted, of a plant that moves: some effect makes up for any one stroke
 BLIND_SHOWN = 4  # names of what a recording cannot show
 HELD_SHOWN = 3  # names of what is held
 
@@ -41,6 +43,18 @@ def judged(
     if leader and leader.reasons == (SHARE_REASON,) and share_removed(leader) > LEAST_PROXY:
         return Verdict.SMALL_PROXY
     return Verdict.NOTHING_MISSING
+
+
+def too_short(base: Fit) -> bool:
+    """Whether too little was fitted for anything to be named; a vessel's decay is one window."""
+    return moves(base.windows.plant) and len(base.windows) < FEWEST_WINDOWS
+
+
+def too_short_text(base: Fit) -> str:
+    """The same in words."""
+    windows = base.windows
+    seconds = len(windows) * windows.length * windows.recordings[0].sample_time_s
+    return f"{seconds:.2g} s were fitted, too little to tell what is missing"
 
 
 def far_above_noise(held_out: Fit | None) -> list[str]:
