@@ -70,7 +70,8 @@ def known_procedure(name: str, tank: str | None = None) -> Procedure:
     try:
         volume_m3 = quantity(tank, "tank_volume_m3")
     except UnitError as error:
-        raise InputError(Message(str(error), "--tank")) from error
+        what, _, _ = str(error).partition(";")  # what it expects is for smaller volumes, in cm^3
+        raise InputError(Message(what, "--tank", 'a volume such as "0.344 l"')) from error
     if not 0.0 < volume_m3 < inf:
         raise InputError(Message(f"{tank!r} is no volume of a tank", "--tank", "one above zero"))
     return replace(found, run=partial(found.run, tank_volume_m3=volume_m3))

@@ -80,6 +80,7 @@ def test_identify_writes_a_rig_with_what_it_found(tmp_path):
         (["friction", "rig.toml", "a.csv", "--into", "b.toml"], "writes nothing without -o"),
         (["friction", "rig.toml", "a.csv", "--tank", "1 l"], "takes no volume of a tank"),
         (["dead-volume", "rig.toml", "a.csv", "--tank", "1 bar"], "does not fit"),
+        (["dead-volume", "rig.toml", "a.csv", "--tank", "0.344"], 'such as "0.344 l"'),
         (["dead-volume", "rig.toml", "a.csv", "--tank", "-1 l"], "is no volume of a tank"),
         (["dead-volume", "rig.toml", "a.csv", "--tank", "nan l"], "is no volume of a tank"),
     ],

@@ -80,8 +80,7 @@ def add(
     names = _names_in(name)
     require_place(rig, plant, names)
     candidates = [plant.candidates[each] for each in names]
-    progress("prior fit")
-    problem = pose(rig, train, validation, believed=BELIEVED)
+    problem = pose(rig, train, validation, believed=BELIEVED, progress=progress)
     for candidate in candidates:
         _require_absent(rig, plant, problem, candidate)
     progress(f"refit with {name}")
@@ -133,8 +132,7 @@ def add_law(
         If none passes the criteria that an effect must pass.
     """
     train, validation, evidence = _with_held_out(rig, train, validation)
-    progress("prior fit")
-    problem = pose(rig, train, validation, believed=BELIEVED)
+    problem = pose(rig, train, validation, believed=BELIEVED, progress=progress)
     progress("empirical law")
     where = locate(problem, train)
     law = empirical_law(problem, scan_catalogue(problem), where=where)

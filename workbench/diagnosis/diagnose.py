@@ -92,8 +92,7 @@ def diagnose(
     (train, validation), doubts = trusted(rig, train, validation)
     warnings = tuple(map(str, doubts))
     train, validation, evidence = held_out(train, validation)
-    progress("prior fit")
-    problem = pose(rig, train, validation, most_windows, BELIEVED)
+    problem = pose(rig, train, validation, most_windows, BELIEVED, progress)
     evidence = weighed(evidence, problem.base_validation)
     if not evidence.strong:
         warnings += (WARNINGS[evidence],)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import inf
 
@@ -164,10 +164,12 @@ def pose(
     validation: Sequence[Recording] = (),
     most_windows: int = MOST_WINDOWS,
     believed: float = inf,
+    progress: Callable[[str], None] = lambda message: None,
 ) -> Problem:
     """Cut, fit and validate.
 
     ``believed`` bounds how many prior deviations a parameter may go: see :data:`BELIEVED`.
+    ``progress`` is told of each stage, since a stiff plant takes a minute for one.
 
     The fit is made twice, the second time with the error model of the first, and again where that
     one tells far other errors; then from starts that earlier windows give and points beside it.
@@ -185,10 +187,15 @@ def pose(
     length_s = window_length_s(plant, train, validation)
     windows = cut_windows(plant, train, noise, length_s, most_windows)
     unknowns = nominal_unknowns(plant, rig.deviations, rig.fixed, added, believed)
+    progress(f"prior fit of {len(unknowns)} parameters to {len(windows)} windows")
     first = fitted_twice(windows, unknowns, unknowns.scaled(plant.values))
-    base = shaken(continued(consistent(first), ITERATIONS), ITERATIONS)
+    progress("prior fit weighed by its own errors")
+    found = continued(consistent(first), ITERATIONS)
+    progress("prior fit from points beside it")
+    base = shaken(found, ITERATIONS)
     held_out = None
     if validation:
+        progress("prior fit on what is held out")
         # half as many as the training has are enough to judge a plant that is not fitted to them
         most = max(len(windows) // 2, LEAST_HELD_OUT_WINDOWS)
         cut_s = windows.length * train[0].sample_time_s
