@@ -10,6 +10,7 @@ from studies.text import columns, number, percent, removed, shown, spread
 from studies.text_of_next_recording import next_recording_text
 from studies.text_of_ranking import imitated_text, ranking_text
 from workbench.diagnosis.result import LEAST_GAIN
+from workbench.diagnosis.where import acts_in
 from workbench.fitting.posterior import FAR_MOVED
 from workbench.units import public_name
 
@@ -87,9 +88,25 @@ def where_text(found: Diagnosis) -> str:
     if where.certain and follows:
         lines.append(f"missing term of {where.balance} follows {', '.join(follows)}")
         lines += [] if where.memory is None else [_memory_text(*where.memory)]
+    lines += _elsewhere(found, where)
     shares = [f"{name} {percent(share)}" for name, share in where.by_regime.items()][:4]
     left = f"error left by the prior fit (regimes overlap): {', '.join(shares)}"
     return "\n".join([*lines, *([left] if shares else [])])
+
+
+def _elsewhere(found: Diagnosis, where: Where) -> list[str]:
+    """What is named and does not act where an unknown input helps most; no line where it does.
+
+    An unknown input stands in for anything sample by sample, and so shows where the outputs tell
+    most of it: a leak too slow for a noisy pressure shows in the slide that it lets go.
+    """
+    named = found.named
+    if named is None or not where.certain:
+        return []
+    balances = (where.balance, *_alike(where))
+    if any(acts_in(each, balance) for each in named.candidate.singles for balance in balances):
+        return []
+    return [f"{named.candidate.name} acts elsewhere: the ranking decides, by refits of windows"]
 
 
 def _alike(where: Where) -> list[str]:

@@ -105,3 +105,15 @@ def test_a_blind_candidate_says_so_after_its_reasons():
     row = replace(refused(SHARE_REASON, train=0.1, held_out=0.1), visible_from=inf)
     text = diagnosis_text(replace(diagnosis(Verdict.NOTHING_MISSING), ranking=(row,)), UNITS)
     assert "(10.0 % as the mean of both sets); this recording cannot show it" in text
+
+
+def test_what_is_named_and_does_not_act_where_an_unknown_input_helps_most_is_told():
+    """As a leak of the cap side of the rig, of which the force on its rod tells most."""
+    found, told = diagnosis(), f"{LEAK.name} acts elsewhere"
+    gains = {"slide.momentum": 436.0, "chamber_a.mass": 34.0}
+    other = replace(found.where, balance="slide.momentum", by_balance=gains)
+    alike = replace(other, by_balance=gains | {"chamber_a.mass": 434.0})
+
+    assert told in diagnosis_text(replace(found, where=other), UNITS)
+    for where in (found.where, alike):
+        assert told not in diagnosis_text(replace(found, where=where), UNITS)
