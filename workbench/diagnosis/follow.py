@@ -1,14 +1,17 @@
 """What a diagnosis follows: the scan, first fits of the few in front, refits of the best few.
 
 Those that come near the best are shaken, and rivals of a leader begin once more where it ended.
+Where the prior fit has left the priors far behind, what leads there is refitted from there too.
 
 Source: diagnosis.md 1.4 and 1.5.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+
+import numpy as np
 
 from workbench.diagnosis.judge import (
     CLOSE_DROP_SAME,
@@ -23,6 +26,7 @@ from workbench.diagnosis.refit import (
     counted_from,
     refit,
     refit_from,
+    refit_from_priors,
     refit_shaken,
     refit_shift,
 )
@@ -41,6 +45,8 @@ SHIFTS_REFITTED = 2  # parameters that leave their priors
 WORTH_A_SHIFT = 0.25  # of the best refit
 LOCATED = 2  # candidates that are followed because they act where the smoother finds a lack
 IMITATED = 2  # candidates that are followed because they lead where no parameter has moved
+IMPLAUSIBLE = 4.0  # prior deviations: one of 16 000 right values is further off
+AS_MUCH = 0.5  # of the best drop where no parameter has moved
 LEADERS = 2  # whose rivals are refitted from their places
 LEAVES_MUCH = 0.5  # of the misfit removed: below it, rivals are refitted from the leader's place
 
@@ -67,7 +73,8 @@ def follow(
     """
     progress("scan of the catalogue")
     profiles = scan_catalogue(problem)
-    looked = _shortlist(profiles, where, scan_from_priors(problem))
+    imitated = scan_from_priors(problem)
+    looked = _shortlist(profiles, where, imitated)
     progress(f"first fits of {len(looked)} candidates")
     begun = sorted((rough_fit(problem, p) for p in looked), key=lambda each: -each.share)
     refits: list[Refit] = []
@@ -78,6 +85,7 @@ def follow(
         if promising or hopeful or not refits:
             progress(f"refit with {each.profile.candidate.name}")
             refits.append(refit(problem, each))
+    refits = _lowest(refits, _from_priors(problem, imitated, progress))
     moved = shifts(problem)
     least = WORTH_A_SHIFT * max((each.drop_train for each in refits), default=0.0)
     for shift in [each for each in moved if each.leaves and each.drop > least][:SHIFTS_REFITTED]:
@@ -112,12 +120,38 @@ def _lowest_of_each(
     problem: Problem, refits: Sequence[Refit], earlier: Sequence[Refit]
 ) -> list[Refit]:
     """The lowest refit of every candidate, all measured from the base there is now."""
+    now = {id(each) for each in refits}
+    return [
+        each if id(each) in now else counted_from(problem.base, problem.base_validation, each)
+        for each in _lowest(refits, earlier)
+    ]
+
+
+def _lowest(refits: Sequence[Refit], others: Iterable[Refit]) -> list[Refit]:
+    """The lowest refit of every candidate of two lists, in the order in which they come up."""
     found = {each.candidate.name: each for each in refits}
-    for each in earlier:
+    for each in others:
         name = each.candidate.name
-        if name not in found or each.fit.cost < found[name].fit.cost:
-            found[name] = counted_from(problem.base, problem.base_validation, each)
+        found[name] = min(found.get(name, each), each, key=lambda one: one.fit.cost)
     return [*found.values()]
+
+
+def _from_priors(
+    problem: Problem, imitated: Sequence[Profile], progress: Progress
+) -> Iterator[Refit]:
+    """Refits of what leads where no parameter has moved, from there; none near the priors.
+
+    Parameters that have gone as far as is believed may stand in for a delay together, and hold each
+    other there: no first fit from the base gives one of them back.
+    """
+    base = problem.base
+    nuisances = base.unknowns.precision >= 1.0
+    if not np.any(np.abs(base.point.t[nuisances]) > IMPLAUSIBLE):
+        return
+    for profile in imitated[:IMITATED]:
+        if profile.drop > max(AS_MUCH * imitated[0].drop, problem.misfit):
+            progress(f"refit with {profile.candidate.name} from the priors")
+            yield refit_from_priors(problem, profile)
 
 
 def _shaken(problem: Problem, refits: Sequence[Refit]) -> list[Refit]:

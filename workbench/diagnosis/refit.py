@@ -14,6 +14,7 @@ import numpy as np
 from workbench.candidate import Candidate
 from workbench.diagnosis.result import Size
 from workbench.diagnosis.rough import KEPT, Rough, windows_for
+from workbench.diagnosis.scan import Profile
 from workbench.diagnosis.shifts import Shift
 from workbench.fitting.continued import continued
 from workbench.fitting.costs import best_of_each, points_costs
@@ -92,6 +93,18 @@ def refit_from(
     begun = best_of_each(points_costs(windows, unknowns, points).rows)
     fit = fit_windows(windows, unknowns, begun, ITERATIONS)
     return _refit(problem, candidate, fit, (candidate.strength, *candidate.forms))
+
+
+def refit_from_priors(problem: Problem, profile: Profile) -> Refit:
+    """Fit a candidate with its best size of a scan from the priors, from there, and validate it.
+
+    Start states that suited the base may not suit a plant so far from it; earlier windows give
+    others.
+    """
+    nominal = problem.base.unknowns.values(problem.at_priors)
+    found = refit_from(problem, profile.candidate, {**nominal, **profile.trials[0].values})
+    fit = continued(found.fit, ITERATIONS)
+    return found if fit is found.fit else _refit(problem, found.candidate, fit, tuple(found.size))
 
 
 def refit_shaken(problem: Problem, found: Refit) -> Refit:
