@@ -1,4 +1,4 @@
-"""Controllers and estimators that a machine does not compute within their sample.
+"""Controllers that a machine does not compute within their sample.
 
 A check closes the loop as if no time passed between a measurement and its command.  Where the calls
 take longer than a sample, on this machine that loop cannot be run at all.
