@@ -294,6 +294,6 @@ def check_rig(
     found = CheckedRuns(setup, tuple(rows), spec if asked else None)
     if found.lost and not found.several:
         raise ArithmeticError(found.lost[0].said)
-    for said in slow_calls(setup.loops, found.found):
+    if said := slow_calls(setup.loops, found.found):
         warnings.warn(said, stacklevel=2)
     return found

@@ -6,7 +6,6 @@ take longer than a sample, on this machine that loop cannot be run at all.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,14 +16,15 @@ if TYPE_CHECKING:
     from studies.checking import Checked, Loops
 
 
-def slow_calls(loops: Loops, found: Checked) -> Iterator[str]:
-    """A sentence where the usual call of the control takes longer than its sample.
+def slow_calls(loops: Loops, found: Checked) -> str:
+    """A sentence where the usual call of the only controller takes longer than its sample.
 
     The median over all loops, since what else the machine does makes single ones slow.
     """
-    for controller in loops.controllers.values():
-        times_s = [row.solve_median_s for row in found.rows]
-        usual_s, sample_s = float(np.median(times_s)) if times_s else 0.0, controller.sample_time_s
-        if usual_s > sample_s:
-            takes, has = (f"{number(1e3 * each, 2)} ms" for each in (usual_s, sample_s))
-            yield f"a call of the controller takes {takes} here, longer than its sample of {has}"
+    (controller,) = loops.controllers.values()
+    sample_s = controller.sample_time_s
+    usual_s = float(np.median([row.solve_median_s for row in found.rows])) if found.rows else 0.0
+    if usual_s <= sample_s:
+        return ""
+    takes, has = (f"{number(1e3 * each, 2)} ms" for each in (usual_s, sample_s))
+    return f"a call of the controller takes {takes} here, longer than its sample of {has}"

@@ -172,9 +172,9 @@ def _top_keys(text: RigText, lines: Mapping[str, str], plant: Plant) -> None:
             expected = f"one of {listed((*lines, LIMITS), 99)}"
             text.wrong((key,), f"{plant.name} is not judged by it", expected=expected)
         elif key not in known:
-            numbers = _numbers_called(key, known, plant)
-            expected = f"a number of a controller in its table: {listed(numbers)}"
-            expected = expected if numbers else f"one of {listed(known, len(known))}"
+            expected = f"one of {listed(known, len(known))}"
+            if numbers := _numbers_called(key, known, plant):
+                expected = f"a number of a controller in its table: {listed(numbers)}"
             what = f"{text.kind} has no such name"
             text.wrong((key,), what, expected=expected, known=numbers or known)
 

@@ -108,8 +108,8 @@ def _valve_sides(course: Course) -> dict[str, np.ndarray]:
 def _sides(signal: Signal, away: np.ndarray, valve: bool) -> dict[str, np.ndarray]:
     """Sides by how far ``away`` from its rest a command arrives, named by where it rests."""
     member = signal.name.rpartition(".")[0]
-    span = signal.upper - signal.lower
-    closed = OPEN_SHARE * (span if np.isfinite(span) else 1.0)
+    span = signal.upper - signal.lower if np.isfinite(signal.upper - signal.lower) else 1.0
+    closed = OPEN_SHARE * span
     if signal.levels:
         return {f"{member} energised": away > closed, f"{member} released": away <= closed}
     unit, to_people = display_unit(signal.name), display_scale(signal.name).from_si
@@ -117,7 +117,7 @@ def _sides(signal: Signal, away: np.ndarray, valve: bool) -> dict[str, np.ndarra
     sides = {f"above {centre}": away > closed, f"below {centre}": away < -closed}
     if not valve:
         return {f"{member} {side}": samples for side, samples in sides.items()}
-    near = (np.abs(away) > closed) & (np.abs(away) <= NEAR_NULL_SHARE / OPEN_SHARE * closed)
+    near = (np.abs(away) > closed) & (np.abs(away) <= NEAR_NULL_SHARE * span)
     return {
         f"{member} closed": np.abs(away) <= closed,
         f"{member} near null": near,

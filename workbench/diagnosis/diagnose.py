@@ -185,6 +185,7 @@ def _concluded(
     far = far_above_noise(problem.base_validation)
     verdict = judged(ranking, law, evidence.strong, far)
     short = too_short(problem.base) and (law is not None or verdict in NAMING)
+    said = too_short_text(problem.base) if short else ""
     if short:
         verdict, law = Verdict.RECORDING_TOO_WEAK, None
     if verdict in NAMING or (ranking and ranking[0].accepted):
@@ -200,9 +201,7 @@ def _concluded(
     return Diagnosis(
         rig_name=rig_name,
         verdict=verdict,
-        sentence=too_short_text(problem.base)
-        if short
-        else sentence(verdict, ranking, law, evidence),
+        sentence=said or sentence(verdict, ranking, law, evidence),
         ranking=ranking,
         where=where,
         before=errors_of(problem.base, problem.base_validation),

@@ -120,11 +120,8 @@ def _lowest_of_each(
     problem: Problem, refits: Sequence[Refit], earlier: Sequence[Refit]
 ) -> list[Refit]:
     """The lowest refit of every candidate, all measured from the base there is now."""
-    now = {id(each) for each in refits}
-    return [
-        each if id(each) in now else counted_from(problem.base, problem.base_validation, each)
-        for each in _lowest(refits, earlier)
-    ]
+    base, held_out = problem.base, problem.base_validation
+    return _lowest(refits, (counted_from(base, held_out, each) for each in earlier))
 
 
 def _lowest(refits: Sequence[Refit], others: Iterable[Refit]) -> list[Refit]:

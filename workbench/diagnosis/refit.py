@@ -82,6 +82,13 @@ def refit_from(
     ``near`` is a fit on the same windows whose start states are taken where they suit better than
     those of the base.
     """
+    fit = _fitted_from(problem, candidate, values, near)
+    return _refit(problem, candidate, fit, (candidate.strength, *candidate.forms))
+
+
+def _fitted_from(
+    problem: Problem, candidate: Candidate, values: Mapping[str, float], near: Fit | None = None
+) -> Fit:
     windows = windows_for(problem, candidate)
     unknowns = problem.unknowns(windows.plant, candidate)
     shapes = [f"{c.member}.{key}" for c in candidate.singles for key in c.cause.shapes]
@@ -91,8 +98,7 @@ def refit_from(
     fits = (problem.base, near) if near else (problem.base,)
     points = [Point(t, carried(each.point.starts, each.windows, windows)) for each in fits]
     begun = best_of_each(points_costs(windows, unknowns, points).rows)
-    fit = fit_windows(windows, unknowns, begun, ITERATIONS)
-    return _refit(problem, candidate, fit, (candidate.strength, *candidate.forms))
+    return fit_windows(windows, unknowns, begun, ITERATIONS)
 
 
 def refit_from_priors(problem: Problem, profile: Profile) -> Refit:
@@ -101,10 +107,10 @@ def refit_from_priors(problem: Problem, profile: Profile) -> Refit:
     Start states that suited the base may not suit a plant so far from it; earlier windows give
     others.
     """
-    nominal = problem.base.unknowns.values(problem.at_priors)
-    found = refit_from(problem, profile.candidate, {**nominal, **profile.trials[0].values})
-    fit = continued(found.fit, ITERATIONS)
-    return found if fit is found.fit else _refit(problem, found.candidate, fit, tuple(found.size))
+    candidate, nominal = profile.candidate, problem.base.unknowns.values(problem.at_priors)
+    fit = _fitted_from(problem, candidate, {**nominal, **profile.trials[0].values})
+    names = (candidate.strength, *candidate.forms)
+    return _refit(problem, candidate, continued(fit, ITERATIONS), names)
 
 
 def refit_shaken(problem: Problem, found: Refit) -> Refit:

@@ -15,6 +15,7 @@ from workbench.recording import Recording
 from workbench.vessel import Vessel
 
 STILL_M = 2e-4  # a piston that stays within is held
+BEFORE = 5  # samples at the start, before the push
 
 
 def pressed_chamber(plant: Plant, recording: Recording) -> Chamber | Vessel:
@@ -49,6 +50,17 @@ def geometry(plant: Plant, chamber: Chamber | Vessel, position_m: float) -> tupl
         x[list(plant.state_list).index(position_channel(chamber))] = position_m
     volume, surface = plant.model.quantities(*names)(x, *plant.nominal).full().ravel()
     return float(volume), float(surface)
+
+
+def kept_share(
+    plant: Plant, chamber: Chamber | Vessel, recording: Recording, volume_m3: float, end_pa: float
+) -> float:
+    """The gas at the end, in this volume, over that before the push; 1 of a vessel."""
+    if isinstance(chamber, Vessel):
+        return 1.0
+    begun_m3, _ = geometry(plant, chamber, float(recording[position_channel(chamber)][0]))
+    before_pa = float(np.mean(recording[f"{chamber.name}.pressure_pa"][:BEFORE]))
+    return end_pa * volume_m3 / (before_pa * begun_m3)
 
 
 def held_position_m(chamber: Chamber | Vessel, recording: Recording) -> float:

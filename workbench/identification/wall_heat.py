@@ -29,6 +29,7 @@ from workbench.identification.held_gas import (
     STILL_M,
     geometry,
     held_position_m,
+    kept_share,
     plugged,
     position_channel,
     pressed_chamber,
@@ -49,8 +50,8 @@ from workbench.parts import Chamber
 from workbench.plant import Plant
 from workbench.recording import Recording
 from workbench.rig import Rig
+from workbench.vessel import Vessel
 
-BEFORE = 5  # samples at the start, before the push
 LATER_S = 0.02  # after the stop: sensors and the piston have come to rest
 LEAST_NOISE = 10.0  # noise deviations that the pressure must decay by
 LEAST_TIME_CONSTANTS = 3.0
@@ -140,19 +141,9 @@ def _decay(plant: Plant, recording: Recording) -> _Decay:
     chamber = pressed_chamber(plant, recording)
     channel = f"{chamber.name}.pressure_pa"
     noise = measured_noise([recording], [channel])[channel]
-    first, held_m = 0, held_position_m(chamber, recording)
+    held_m = held_position_m(chamber, recording)
     volume, surface = geometry(plant, chamber, held_m)
-    begun_m3 = volume
-    if isinstance(chamber, Chamber):
-        position = recording[position_channel(chamber)]
-        away_m = np.abs(position - held_m)
-        begun_m3, _ = geometry(plant, chamber, float(position[0]))
-        moving = np.flatnonzero(away_m > STILL_M)
-        expected = "a piston pushed quickly and then held, both ports of its chamber plugged"
-        if not len(moving):
-            raise unfit(recording, "is no thermal decay: the piston never moves", expected)
-        first = int(moving[-1]) + 1 + round(LATER_S / recording.sample_time_s)
-    rest = recording.part(first, len(recording))
+    rest = recording.part(_stopped(chamber, recording, held_m), len(recording))
     pressure = rest[channel] if len(rest) else np.zeros(1)
     n = max(len(rest) // 20, 1)
     fallen_pa = abs(float(np.mean(pressure[:n]) - np.mean(pressure[-n:])))
@@ -160,9 +151,19 @@ def _decay(plant: Plant, recording: Recording) -> _Decay:
         what = f"is no thermal decay: {chamber.name} moves by {fallen_pa / 1e5:.2g} bar after it"
         expected = f"a decay of at least {LEAST_NOISE * noise / 1e5:.2g} bar, logged to its end"
         raise unfit(recording, what, expected)
-    before_pa, end_pa = float(np.mean(recording[channel][:BEFORE])), float(np.mean(pressure[-n:]))
-    kept = 1.0 if volume == begun_m3 else end_pa * volume / (before_pa * begun_m3)
+    kept = kept_share(plant, chamber, recording, volume, float(np.mean(pressure[-n:])))
     return _Decay(rest, plugged(plant, chamber, volume, surface), channel, noise, kept)
+
+
+def _stopped(chamber: Chamber | Vessel, recording: Recording, held_m: float) -> int:
+    """The sample at which a pushed piston and its sensors have come to rest; 0 of a vessel."""
+    if isinstance(chamber, Vessel):
+        return 0
+    moving = np.flatnonzero(np.abs(recording[position_channel(chamber)] - held_m) > STILL_M)
+    expected = "a piston pushed quickly and then held, both ports of its chamber plugged"
+    if not len(moving):
+        raise unfit(recording, "is no thermal decay: the piston never moves", expected)
+    return int(moving[-1]) + 1 + round(LATER_S / recording.sample_time_s)
 
 
 def _exponential(decay: _Decay) -> Solution:
