@@ -17,13 +17,14 @@ from workbench.diagnosis.judge import (
 from workbench.diagnosis.result import Diagnosis, Ranked
 
 SHOWN_RANKS = 12
+DROPS = "drop: share of the weighted misfit beyond noise that goes away, on either set"
 
 
 def ranking_text(found: Diagnosis) -> str:
     """The best of the ranking as a table.
 
-    The index is the modification index, in chi2; compensable is what the fitted parameters can
-    imitate.
+    Drops are of the misfit beyond noise.  The index is the modification index, in chi2; compensable
+    is what the fitted parameters can imitate.
     """
     rows = [
         (
@@ -42,7 +43,7 @@ def ranking_text(found: Diagnosis) -> str:
     head = ("", "effect", "drop train", "validation", "mod. index", "compensable", "size", "by", "")
     rest = len(found.ranking) - SHOWN_RANKS
     more = f"\n... and {rest} more, in the JSON" if rest > 0 else ""
-    return columns(head, rows) + more
+    return f"{columns(head, rows)}{more}\n{DROPS}"
 
 
 def sizes_text(row: Ranked) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from math import inf
 from typing import Any
@@ -54,6 +54,9 @@ class Plant:
     measured: tuple[str, ...]
     optional_outputs: tuple[str, ...] = ()
     origin: str = ""
+    _leaner: dict[frozenset[str], Plant] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
 
     def without(self, *names: str) -> Plant:
         """The same plant with the named effects taken out altogether."""
@@ -117,21 +120,27 @@ class Plant:
         return self.with_values({c.strength: known[c.strength].null for c in candidates})
 
     def lean(self, keep: Iterable[str] = ()) -> Plant:
-        """The same plant without what is absent, except in the members named in ``keep``."""
-        kept = set(keep)
-        effects = (e for e in self.effects if e.name in kept or not e.absent)
-        return replace(self, effects=tuple(e if e.name in kept else e.reduced() for e in effects))
+        """The same plant without what is absent, except in the members named in ``keep``.
+
+        Asked again it is the same object, whose model is built once.
+        """
+        kept = frozenset(keep)
+        if kept not in self._leaner:
+            there = (e for e in self.effects if e.name in kept or not e.absent)
+            effects = tuple(e if e.name in kept else e.reduced() for e in there)
+            self._leaner[kept] = replace(self, effects=effects)
+        return self._leaner[kept]
 
     def __getstate__(self) -> dict[str, Any]:
-        """All but the model, which another process builds again: its symbols do not travel."""
-        return {key: value for key, value in self.__dict__.items() if key != "model"}
+        """The fields alone: another process builds the model again, its symbols do not travel."""
+        return {each.name: self.__dict__[each.name] for each in fields(self)} | {"_leaner": {}}
 
     @property
     def members(self) -> tuple[Effect, ...]:
         """Parts, then effects."""
         return (*self.parts, *self.effects)
 
-    @property
+    @cached_property
     def candidates(self) -> dict[str, Candidate]:
         """Every cause of the catalogue that this plant has a place for, by public name."""
         placed = (
@@ -141,17 +150,17 @@ class Plant:
         )
         return {candidate.name: candidate for candidate in placed}
 
-    @property
+    @cached_property
     def values(self) -> dict[str, float]:
         """All parameter values, by ``part.parameter_unit``."""
         return {f"{m.name}.{key}": getattr(m, key) for m in self.members for key in m.parameters()}
 
-    @property
+    @cached_property
     def parameters(self) -> dict[str, Parameter]:
         """What is known of each parameter, by ``part.parameter_unit``."""
         return {f"{m.name}.{k}": v for m in self.members for k, v in m.parameters().items()}
 
-    @property
+    @cached_property
     def state_list(self) -> dict[str, State]:
         """Every state by its full name."""
         return {f"{m.name}.{s.quantity}": s for m in self.members for s in m.states()}

@@ -47,6 +47,7 @@ from workbench.diagnosis.verdict import (
     too_short_text,
     unexplained,
     unsteady,
+    worsened,
 )
 from workbench.diagnosis.where import locate
 from workbench.effect import Kind
@@ -196,16 +197,20 @@ def _concluded(
     if best and best.fit and not best.fit.converged:
         told = f"the refit with {best.candidate.name} did not converge: its size may be off"
         warnings = (told, *warnings)
-    after = (law.fit, law.validation) if law else (best and best.fit, best and best.validation)
-    warnings += held(after[0] or problem.base)
+    last, unseen = (
+        (law.fit, law.validation) if law else (best and best.fit, best and best.validation)
+    )
+    before = errors_of(problem.base, problem.base_validation)
+    after = errors_of(last, unseen) if last else {}
+    warnings += (*worsened(before, after), *held(last or problem.base))
     return Diagnosis(
         rig_name=rig_name,
         verdict=verdict,
         sentence=said or sentence(verdict, ranking, law, evidence),
         ranking=ranking,
         where=where,
-        before=errors_of(problem.base, problem.base_validation),
-        after=errors_of(*after) if after[0] else {},
+        before=before,
+        after=after,
         law=law,
         warnings=warnings,
         base=problem.base,

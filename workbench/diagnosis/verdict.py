@@ -8,7 +8,7 @@ from workbench.diagnosis.judge import LEAST_PROXY, SHARE_REASON, share_removed
 from workbench.diagnosis.power import too_weak
 from workbench.diagnosis.result import NAMING, Evidence, Law, Ranked, Verdict, told
 from workbench.diagnosis.scan import WIDER, Profile
-from workbench.fitting.errors import errors_of
+from workbench.fitting.errors import Errors, errors_of
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.posterior import held_back
 from workbench.fitting.problem import BELIEVED
@@ -16,6 +16,7 @@ from workbench.fitting.window_length import moves
 from workbench.units import public_name
 
 FAR_ABOVE_NOISE = 3.0  # RMSE over noise that is worth a word where nothing is named
+WORSE = 1.5  # RMSE of an output with what is named over that without it, and over its noise
 UNEXPLAINED = "unexplained errors remain on held-out windows"
 FEWEST_WINDOWS = 2  # fitted, of a plant that moves: some effect makes up for any one stroke
 BLIND_SHOWN = 4  # names of what a recording cannot show
@@ -104,6 +105,21 @@ def unexplained(far: Sequence[str], verdict: Verdict, ranking: Sequence[Ranked])
     if verdict is Verdict.RECORDING_TOO_WEAK or not any(row.blind for row in ranking):
         return (told,)
     return (f"{told}; {_blind(ranking)}",)
+
+
+def worsened(before: Errors, after: Errors) -> tuple[str, ...]:
+    """A warning where an output is clearly worse with what is named than without it.
+
+    The misfit weighs outputs by what is left of them, so one may pay for another; held-out errors
+    are judged as the mean over outputs.
+    """
+    told = [
+        f"{name} in {where} (x {after[where][name].rmse / error.rmse:.2g})"
+        for where in after
+        for name, error in before.get(where, {}).items()
+        if after[where][name].rmse > WORSE * max(error.rmse, error.noise)
+    ]
+    return (f"what is named makes errors larger: {', '.join(told)}",) if told else ()
 
 
 def held(last: Fit) -> tuple[str, ...]:

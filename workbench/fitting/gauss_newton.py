@@ -117,7 +117,7 @@ def fit_windows(
     for _ in range(iterations):
         if stale or at is None:
             at, fresh = linearise(windows, unknowns, now.point, now.residual), True
-        now, fall = _advanced(windows, unknowns, at, now)
+        now, fall = _advanced(windows, unknowns, at, now, fresh)
         converged = fresh and fall < CONVERGED
         if converged:
             break
@@ -139,7 +139,7 @@ def follow(
     """
     now = start
     for _ in range(iterations):
-        now, fall = _advanced(windows, unknowns, at, now)
+        now, fall = _advanced(windows, unknowns, at, now, rescue=True)
         if fall < AGAIN:
             break
         at = secant(windows, at, now.point, now.residual)
@@ -148,19 +148,20 @@ def follow(
 
 
 def _advanced(
-    windows: Windows, unknowns: Unknowns, at: Linearised, now: Cost
+    windows: Windows, unknowns: Unknowns, at: Linearised, now: Cost, rescue: bool
 ) -> tuple[Cost, float]:
     """Where a step leads, or where it began if that costs less; and its fall, of the misfit."""
-    found = _stepped(windows, unknowns, at, now)
+    found = _stepped(windows, unknowns, at, now, rescue)
     fall = (now.cost - found.cost) / beyond_noise(now.cost, windows)
     return min(now, found, key=lambda each: each.cost), fall
 
 
-def _stepped(windows: Windows, unknowns: Unknowns, at: Linearised, now: Cost) -> Cost:
+def _stepped(windows: Windows, unknowns: Unknowns, at: Linearised, now: Cost, rescue: bool) -> Cost:
     """The full step where it keeps half of what it promises, else the best of several damped ones.
 
-    Where none brings much, others are tried; see :func:`_rescued`.  Start states alone need no
-    others: every window has what suits it best already.
+    Where none brings much, others are tried on request; see :func:`_rescued`.  They cost as much as
+    derivatives, so derivatives that may be the reason are taken anew first.  Start states alone
+    need no others: every window has what suits it best already.
     """
     full, *damped = _damped_steps(at, unknowns)
     tried = _costs_after(windows, unknowns, now, [full])
@@ -169,7 +170,9 @@ def _stepped(windows: Windows, unknowns: Unknowns, at: Linearised, now: Cost) ->
         return found
     tried = Costs((*tried.rows, *_costs_after(windows, unknowns, now, damped).rows))
     found = _best(tried, unknowns, now)
-    if not len(unknowns) or now.cost - found.cost > AGAIN * beyond_noise(now.cost, windows):
+    if not (rescue and len(unknowns)) or now.cost - found.cost > AGAIN * beyond_noise(
+        now.cost, windows
+    ):
         return found
     return _rescued(windows, unknowns, at, now, tried)
 

@@ -81,14 +81,18 @@ def _normal(fit: Fit) -> Normal:
 
 
 def fitted_rig(rig: Rig, fit: Fit, added: Sequence[str] = ()) -> Rig:
-    """The rig at fitted values with their standard deviations, and where its law was seen."""
+    """The rig at fitted values with their standard deviations, and where its law was seen.
+
+    What is held by what is believed of it is known no better than before: it keeps its deviation.
+    """
     ours = rig.plant.values
     found = fit.unknowns.values(fit.point.t)
     values = {name: value for name, value in found.items() if name in ours}
     deviations = dict(zip(fit.unknowns.names, posterior_deviation(fit).tolist(), strict=True))
+    deviations |= {each.name: each.prior_deviation for each in held_back(fit)}
     return replace(
         rig.with_added(rig.plant.with_values(values), added),
-        deviations={**rig.deviations, **{n: d for n, d in deviations.items() if d > 0}},
+        deviations={**rig.deviations, **{n: d for n, d in deviations.items() if 0 < d < inf}},
         seen=_seen(rig, fit),
     )
 

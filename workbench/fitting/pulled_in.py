@@ -4,8 +4,9 @@ The prior fit of a model that lacks something moves what it may to imitate it, a
 missing effect begins there.  With the effect in its place there is nothing to imitate any more.
 But where the cost is rough, as that of impacts which come at the wrong instant, no way may lead
 down from there: the effect gets a part of its size, and the nuisances keep theirs.  So they are
-taken back half the way to their priors, then the whole way, with what was added and all start
-states left as they are; both places are followed, and the lowest of the three fits stays.
+taken back half the way to their priors, or the whole way, with what was added and all start states
+left as they are; both places are followed (:mod:`workbench.fitting.halving`), and the lower one
+stays where it is lower than the fit.
 
 Source: the starts of diagnosis.md 1.5 are those of the scan, near the base; these are the same two
 ends, at the base and at the priors, from which ``studies.hidden_cases`` measures what can be seen.
@@ -15,7 +16,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from workbench.fitting.gauss_newton import Fit, fit_windows
+from workbench.fitting.gauss_newton import Fit
+from workbench.fitting.halving import lowest_from
 from workbench.fitting.linearised import Point
 
 FAR = 1.5  # prior deviations: beyond, a parameter may imitate what is missing
@@ -23,7 +25,7 @@ SHARES = (0.5, 0.0)  # of the way that the nuisances have gone
 
 
 def pulled_in(fit: Fit, iterations: int) -> Fit:
-    """The same fit, or a lower one from nearer to the priors; ``iterations`` bound each of the two.
+    """The same fit, or a lower one from nearer to the priors, after at most so many iterations.
 
     Where none has gone further than 1.5 deviations of its prior, none imitates much: the fit stays.
     """
@@ -31,9 +33,7 @@ def pulled_in(fit: Fit, iterations: int) -> Fit:
     nuisances = unknowns.precision >= 1.0
     if not np.any(np.abs(t[nuisances]) > FAR):
         return fit
-    fits = [fit]
-    for share in SHARES:
-        nearer = unknowns.clipped(np.where(nuisances, share * t, t))
-        start = Point(nearer, fit.point.starts)
-        fits.append(fit_windows(fit.windows, unknowns, start, iterations))
-    return min(fits, key=lambda each: each.cost)
+    nearer = (np.where(nuisances, share * t, t) for share in SHARES)
+    points = [Point(unknowns.clipped(each), fit.point.starts) for each in nearer]
+    best = lowest_from(fit, points, iterations)
+    return min(fit, best, key=lambda each: each.cost)

@@ -17,7 +17,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from workbench.fitting.gauss_newton import Fit, fit_windows, worth_it
+from workbench.fitting.gauss_newton import Fit, worth_it
+from workbench.fitting.halving import lowest_from
 from workbench.fitting.linearised import Point
 
 FACTORS = (1.0 / 1.2, 1.2)  # twice the tenth to which a size should be known
@@ -27,14 +28,11 @@ ROUNDS = 4
 def resized(fit: Fit, names: Sequence[str], iterations: int) -> Fit:
     """The same fit, or a lower one from other sizes of the named parameters.
 
-    ``iterations`` bound each fit; a parameter that is not fitted, or is zero, is left.
+    ``iterations`` bound each round; a parameter that is not fitted, or is zero, is left.
     """
     for _ in range(ROUNDS):
-        fits = [
-            fit_windows(fit.windows, fit.unknowns, point, iterations)
-            for point in points_of_sizes(fit, names, FACTORS)
-        ]
-        lowest = min(fits, key=lambda each: each.cost, default=fit)
+        points = points_of_sizes(fit, names, FACTORS)
+        lowest = lowest_from(fit, points, iterations)
         if not worth_it(lowest.cost, fit):
             break
         fit = lowest
