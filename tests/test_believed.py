@@ -17,7 +17,7 @@ from workbench.diagnosis.result import Kind, Verdict
 from workbench.diagnosis.scan import scan_catalogue
 from workbench.diagnosis.shifts import shifts
 from workbench.diagnosis.verdict import held
-from workbench.fitting.posterior import moved_parameters
+from workbench.fitting.posterior import fitted_rig, moved_parameters
 from workbench.fitting.problem import BELIEVED, pose
 from workbench.fitting.unknowns import WIDE, Unknowns, nominal_unknowns
 from workbench.plants import servo_drive
@@ -168,6 +168,14 @@ def test_what_is_held_is_told_with_how_far_that_is(believing):
 
     assert np.isnan(row.deviation)
     assert "held by what is believed of it; 5 prior deviations away" in moved_text([row])
+
+
+def test_what_is_held_is_written_with_the_deviation_that_it_came_with(believing):
+    """The fit stopped there: it knows of it no better than before, however steep its cost is."""
+    written = fitted_rig(RIG, believing.base)
+
+    assert written.plant.values[FRICTION] == pytest.approx(4.0 + BELIEVED * DEVIATION_N)
+    assert written.deviations[FRICTION] == pytest.approx(DEVIATION_N)
 
 
 def test_only_what_has_a_prior_is_bounded_by_it():

@@ -11,7 +11,8 @@ from studies.text_of_ranking import reasons
 from studies.text_of_results import diagnosis_text, moved_text
 from workbench.diagnosis.judge import HELD_OUT_REASON, SHARE_REASON
 from workbench.diagnosis.result import Verdict
-from workbench.diagnosis.verdict import BLIND_SHOWN, unexplained
+from workbench.diagnosis.verdict import BLIND_SHOWN, unexplained, worsened
+from workbench.fitting.errors import SignalError
 from workbench.fitting.posterior import Moved
 
 FAR = ("slide.position 12 times its noise",)
@@ -38,6 +39,21 @@ def refused(*why, train, held_out, plain=1.0):
 def test_a_reason_that_a_share_beside_it_seems_to_contradict_says_its_number(row, told):
     (said,) = reasons(row)
     assert said == f"{row.reasons[0]} {told}".strip()
+
+
+def test_an_output_that_pays_for_another_is_told():
+    def errors(position_m, pressure_pa, noise_pa=400.0):
+        told = {
+            "slide.position": SignalError(position_m, 90.0, 3e-5),
+            "chamber_a.pressure": SignalError(pressure_pa, 90.0, noise_pa),
+        }
+        return {"train": told}
+
+    worse = worsened(errors(1e-3, 1000.0), errors(1e-4, 2500.0))
+    assert worse == ("what is named makes errors larger: chamber_a.pressure in train (x 2.5)",)
+    assert worsened(errors(1e-3, 1000.0), errors(1e-4, 1400.0)) == ()
+    assert worsened(errors(1e-3, 1000.0, noise_pa=2e3), errors(1e-4, 2500.0)) == ()
+    assert worsened(errors(1e-3, 1000.0), {}) == ()
 
 
 def test_the_plain_error_stands_in_the_json():
