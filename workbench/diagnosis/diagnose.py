@@ -197,9 +197,8 @@ def _concluded(
     if best and best.fit and not best.fit.converged:
         told = f"the refit with {best.candidate.name} did not converge: its size may be off"
         warnings = (told, *warnings)
-    last, unseen = (
-        (law.fit, law.validation) if law else (best and best.fit, best and best.validation)
-    )
+    named = law or best
+    last, unseen = (named.fit, named.validation) if named else (None, None)
     before = errors_of(problem.base, problem.base_validation)
     after = errors_of(last, unseen) if last else {}
     warnings += (*worsened(before, after), *held(last or problem.base))

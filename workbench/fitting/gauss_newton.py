@@ -170,9 +170,8 @@ def _stepped(windows: Windows, unknowns: Unknowns, at: Linearised, now: Cost, re
         return found
     tried = Costs((*tried.rows, *_costs_after(windows, unknowns, now, damped).rows))
     found = _best(tried, unknowns, now)
-    if not (rescue and len(unknowns)) or now.cost - found.cost > AGAIN * beyond_noise(
-        now.cost, windows
-    ):
+    much = now.cost - found.cost > AGAIN * beyond_noise(now.cost, windows)
+    if much or not rescue or not len(unknowns):
         return found
     return _rescued(windows, unknowns, at, now, tried)
 
