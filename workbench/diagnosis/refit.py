@@ -23,12 +23,13 @@ from workbench.fitting.errors import plain_ratio
 from workbench.fitting.gauss_newton import Fit, beyond_noise, fit_windows, leap
 from workbench.fitting.linearised import Point
 from workbench.fitting.posterior import posterior_deviation
-from workbench.fitting.problem import Problem, misfit
+from workbench.fitting.problem import Problem, fitted_twice, misfit
 from workbench.fitting.pulled_in import pulled_in
 from workbench.fitting.resized import points_of_sizes
 from workbench.fitting.shaken import shaken
 from workbench.fitting.start_states import carried
-from workbench.fitting.unknowns import WIDE
+from workbench.fitting.unknowns import WIDE, Unknowns
+from workbench.fitting.windows import Windows
 
 ITERATIONS = 10
 # Factors on a fitted strength or form.  Near break-aways the cost is rough, and a Gauss-Newton step
@@ -89,28 +90,46 @@ def refit_from(
 def _fitted_from(
     problem: Problem, candidate: Candidate, values: Mapping[str, float], near: Fit | None = None
 ) -> Fit:
-    windows = windows_for(problem, candidate)
-    unknowns = problem.unknowns(windows.plant, candidate)
-    shapes = [f"{c.member}.{key}" for c in candidate.singles for key in c.cause.shapes]
-    held = {name: values[name] for name in shapes if name not in unknowns.names}
-    unknowns = replace(unknowns, held={**unknowns.held, **held})
-    t = unknowns.clipped(unknowns.scaled({**windows.plant.values, **values}))
+    windows, unknowns, t = _begun_at(problem, candidate, values)
     fits = (problem.base, near) if near else (problem.base,)
     points = [Point(t, carried(each.point.starts, each.windows, windows)) for each in fits]
     begun = best_of_each(points_costs(windows, unknowns, points).rows)
     return fit_windows(windows, unknowns, begun, ITERATIONS)
 
 
+def _begun_at(
+    problem: Problem, candidate: Candidate, values: Mapping[str, float]
+) -> tuple[Windows, Unknowns, np.ndarray]:
+    """Windows with a candidate, what may move, and the scaled unknowns of parameter values."""
+    windows = windows_for(problem, candidate)
+    unknowns = problem.unknowns(windows.plant, candidate)
+    shapes = [f"{c.member}.{key}" for c in candidate.singles for key in c.cause.shapes]
+    held = {name: values[name] for name in shapes if name not in unknowns.names}
+    unknowns = replace(unknowns, held={**unknowns.held, **held})
+    t = unknowns.clipped(unknowns.scaled({**windows.plant.values, **values}))
+    return windows, unknowns, t
+
+
 def refit_from_priors(problem: Problem, profile: Profile) -> Refit:
     """Fit a candidate with its best size of a scan from the priors, from there, and validate it.
 
-    Start states that suited the base may not suit a plant so far from it; earlier windows give
-    others.
+    So far from the base errors are many times those that its weights tell, and a fit may rest where
+    it is lost by them: beside it one begins as a prior fit does, weighed by its own errors.  Start
+    states that suited the base may not suit the plant either; earlier windows give others.
     """
     candidate, nominal = profile.candidate, problem.base.unknowns.values(problem.at_priors)
-    fit = _fitted_from(problem, candidate, {**nominal, **profile.trials[0].values})
-    names = (candidate.strength, *candidate.forms)
-    return _refit(problem, candidate, continued(fit, ITERATIONS), names)
+    values = {**nominal, **profile.trials[0].values}
+    windows, unknowns, t = _begun_at(problem, candidate, values)
+    own = fitted_twice(windows, unknowns, t).point
+    fits = (
+        continued(fit, ITERATIONS)
+        for fit in (
+            _fitted_from(problem, candidate, values),
+            fit_windows(windows, unknowns, own, ITERATIONS),
+        )
+    )
+    fit = min(fits, key=lambda each: each.cost)
+    return _refit(problem, candidate, fit, (candidate.strength, *candidate.forms))
 
 
 def refit_shaken(problem: Problem, found: Refit) -> Refit:
