@@ -5,12 +5,18 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from test_diagnosis import bench, coulomb
 
 from studies.hidden_benches import GEARBOX
 from studies.hidden_effects import answer, recordings
 from studies.truth.cases import read_cases
-from workbench.diagnosis import follow
+from workbench.diagnosis import follow, refit
 from workbench.diagnosis.diagnose import silent
+from workbench.diagnosis.scan import scan_from_priors
+from workbench.fitting.gauss_newton import fit_windows
+from workbench.fitting.linearised import Point
+from workbench.fitting.problem import pose
+from workbench.rig import load_rig
 
 
 def profile(name, drop):
@@ -50,13 +56,32 @@ def test_what_explains_far_less_at_the_priors_or_less_than_is_left_is_not_refitt
 
 
 def test_of_refits_of_one_candidate_the_lowest_stays_in_its_place():
-    def refit(name, cost):
+    def refitted(name, cost):
         return SimpleNamespace(candidate=SimpleNamespace(name=name), fit=SimpleNamespace(cost=cost))
 
-    first = [refit("delay", 5.0), refit("leak", 4.0)]
-    again = [refit("delay", 3.0), refit("leak", 6.0), refit("line", 7.0)]
+    first = [refitted("delay", 5.0), refitted("leak", 4.0)]
+    again = [refitted("delay", 3.0), refitted("leak", 6.0), refitted("line", 7.0)]
 
     assert follow._lowest(first, again) == [again[0], first[1], again[2]]
+
+
+def test_a_refit_from_the_priors_begins_weighed_by_its_own_errors_too(monkeypatch):
+    """It is found where weights of the base lead nowhere: here that fit makes no step at all."""
+    rig = load_rig('plant = "cylinder_bench"\n[values]\n"chamber.area" = "518.7 mm^2"\n')
+    problem = pose(rig, [bench(1, coulomb)])
+    (profile,) = (p for p in scan_from_priors(problem) if p.candidate.name == "coulomb_friction")
+    found = refit.refit_from_priors(problem, profile)
+
+    def lost(problem, candidate, values):
+        windows, unknowns, t = refit._begun_at(problem, candidate, values)
+        return fit_windows(windows, unknowns, Point(t, windows.start), iterations=0)
+
+    monkeypatch.setattr(refit, "_fitted_from", lost)
+    alone = refit.refit_from_priors(problem, profile)
+
+    assert lost(problem, profile.candidate, profile.trials[0].values).cost > 2.0 * found.fit.cost
+    assert alone.fit.cost == pytest.approx(found.fit.cost, rel=1e-2)
+    assert alone.size["friction.coulomb_force_n"].value == pytest.approx(8.0, rel=0.05)
 
 
 @pytest.mark.slow
