@@ -107,8 +107,8 @@ def fit_windows(
     Every step is taken only if the cost falls.  As long as steps bring more than 2 % of the misfit
     beyond noise, the next uses the same derivatives, corrected by what the step showed: they are
     the dear part.  One that brings less with these is made once more with derivatives taken anew,
-    in the same iteration.  Parts of the whole cost would be no measure: most of it is noise that no fit
-    takes away, and effects that differ by less would be compared half fitted.
+    in the same iteration.  Parts of the whole cost would be no measure: most of it is noise that no
+    fit takes away, and effects that differ by less would be compared half fitted.
     ``start`` is a point, or what it costs where it was run already.  ``at`` are derivatives to
     begin with, taken near by, with the residual of the start.
     """
