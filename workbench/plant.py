@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from math import inf
 from typing import Any
@@ -54,9 +54,6 @@ class Plant:
     measured: tuple[str, ...]
     optional_outputs: tuple[str, ...] = ()
     origin: str = ""
-    _leaner: dict[frozenset[str], Plant] = field(
-        default_factory=dict, init=False, repr=False, compare=False
-    )
 
     def without(self, *names: str) -> Plant:
         """The same plant with the named effects taken out altogether."""
@@ -133,7 +130,12 @@ class Plant:
 
     def __getstate__(self) -> dict[str, Any]:
         """The fields alone: another process builds the model again, its symbols do not travel."""
-        return {each.name: self.__dict__[each.name] for each in fields(self)} | {"_leaner": {}}
+        return {each.name: self.__dict__[each.name] for each in fields(self)}
+
+    @cached_property
+    def _leaner(self) -> dict[frozenset[str], Plant]:
+        """What :meth:`lean` gave already, by what it kept."""
+        return {}
 
     @property
     def members(self) -> tuple[Effect, ...]:
