@@ -119,7 +119,7 @@ def fit_windows(
         if stale or at is None:
             at, fresh = linearise(windows, unknowns, now.point, now.residual), True
         now, fall = _advanced(windows, unknowns, at, now, fresh)
-        if not fresh and fall < AGAIN:
+        if len(unknowns) and not fresh and fall < AGAIN:
             at, fresh = linearise(windows, unknowns, now.point, now.residual), True
             now, fall = _advanced(windows, unknowns, at, now, fresh)
         converged = fresh and fall < CONVERGED
