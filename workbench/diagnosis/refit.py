@@ -5,7 +5,7 @@ Each begins where its first fit (:mod:`workbench.diagnosis.rough`) ended (diagno
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import nan
 
@@ -37,6 +37,8 @@ ITERATIONS = 10
 PROBES = (0.4, 0.6, 0.8, 0.9, 1.15, 1.4, 1.8, 2.5)
 FIRST_ITERATIONS = 4  # of a shift, before it is followed or left
 FAR_BEHIND = 0.4  # of the best share so far: a shift below it is not followed further
+
+Begun = tuple[Windows, Unknowns, np.ndarray]  # windows with a candidate, what may move, and where
 
 
 @dataclass(frozen=True)
@@ -83,23 +85,20 @@ def refit_from(
     ``near`` is a fit on the same windows whose start states are taken where they suit better than
     those of the base.
     """
-    fit = _fitted_from(problem, candidate, values, near)
+    begun = _begun_at(problem, candidate, values)
+    fit = _fitted_near(begun, (problem.base, near) if near else (problem.base,))
     return _refit(problem, candidate, fit, (candidate.strength, *candidate.forms))
 
 
-def _fitted_from(
-    problem: Problem, candidate: Candidate, values: Mapping[str, float], near: Fit | None = None
-) -> Fit:
-    windows, unknowns, t = _begun_at(problem, candidate, values)
-    fits = (problem.base, near) if near else (problem.base,)
+def _fitted_near(begun: Begun, fits: Sequence[Fit]) -> Fit:
+    """A fit whose windows begin with the start states of one of these fits, as suits each."""
+    windows, unknowns, t = begun
     points = [Point(t, carried(each.point.starts, each.windows, windows)) for each in fits]
-    begun = best_of_each(points_costs(windows, unknowns, points).rows)
-    return fit_windows(windows, unknowns, begun, ITERATIONS)
+    start = best_of_each(points_costs(windows, unknowns, points).rows)
+    return fit_windows(windows, unknowns, start, ITERATIONS)
 
 
-def _begun_at(
-    problem: Problem, candidate: Candidate, values: Mapping[str, float]
-) -> tuple[Windows, Unknowns, np.ndarray]:
+def _begun_at(problem: Problem, candidate: Candidate, values: Mapping[str, float]) -> Begun:
     """Windows with a candidate, what may move, and the scaled unknowns of parameter values."""
     windows = windows_for(problem, candidate)
     unknowns = problem.unknowns(windows.plant, candidate)
@@ -119,15 +118,9 @@ def refit_from_priors(problem: Problem, profile: Profile) -> Refit:
     """
     candidate, nominal = profile.candidate, problem.base.unknowns.values(problem.at_priors)
     values = {**nominal, **profile.trials[0].values}
-    windows, unknowns, t = _begun_at(problem, candidate, values)
-    own = fitted_twice(windows, unknowns, t).point
-    fits = (
-        continued(fit, ITERATIONS)
-        for fit in (
-            _fitted_from(problem, candidate, values),
-            fit_windows(windows, unknowns, own, ITERATIONS),
-        )
-    )
+    begun = windows, unknowns, t = _begun_at(problem, candidate, values)
+    own = fit_windows(windows, unknowns, fitted_twice(windows, unknowns, t).point, ITERATIONS)
+    fits = [continued(each, ITERATIONS) for each in (_fitted_near(begun, [problem.base]), own)]
     fit = min(fits, key=lambda each: each.cost)
     return _refit(problem, candidate, fit, (candidate.strength, *candidate.forms))
 
