@@ -20,7 +20,7 @@ Inequalities in System and Control Theory", SIAM 1994, Ch. 5 (common function).
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import combinations, product
@@ -30,6 +30,7 @@ from scipy.linalg import LinAlgWarning, eigvalsh, solve_discrete_lyapunov
 
 LONGEST = 1 << 14  # samples of dwell time that are still looked at
 MOST = 1.0 - 1e-9  # that a function may keep of itself in a sample
+JOINING = 4  # loops that join a problem at a time
 
 Loops = Mapping[str, tuple[np.ndarray, ...]]
 """Closed loops by mode, its own law's first, each of shape (n, n)."""
@@ -77,7 +78,7 @@ def certificate(loops: Loops, sample_time_s: float) -> Certificate:
     breaking = tuple(
         (one, other)
         for one, other in combinations(names, 2)
-        if common_function([*loops[one], *loops[other]]) is None
+        if not share_a_function([*loops[one], *loops[other]])
     )
     own = [loops[name][0] for name in names]
     if (P := common_function(own)) is not None:
@@ -88,29 +89,37 @@ def certificate(loops: Loops, sample_time_s: float) -> Certificate:
     return Certificate(names, (), None, False, 0.0, breaking, dwell_s, samples == 1)
 
 
-def common_function(loops: list[np.ndarray]) -> np.ndarray | None:
+def common_function(loops: Sequence[np.ndarray]) -> np.ndarray | None:
     """P with A' P A < P for all loops, shape (n, n), or None where none was found.
 
     Maximises by how much all of them shrink x'Px, in coordinates in which the first loop does so
     evenly: the poles of a slow integral and a fast lag are far apart.
     """
-    import cvxpy as cp
-
-    if any(_radius(A) >= 1.0 for A in loops):
-        return None
-    T = _coordinates(loops[0])
-    moved = [np.linalg.solve(T, A @ T) for A in loops]
-    n = len(T)
-    P, gain = cp.Variable((n, n), symmetric=True), cp.Variable()
-    shrinks = [P - A.T @ P @ A >> gain * np.eye(n) for A in moved]
-    _solve(cp.Problem(cp.Maximize(gain), [P << np.eye(n), *shrinks]))
-    if not _holds([(A, P.value, P.value) for A in moved]):
+    moved, T = _evenly(loops)
+    P = _shrinking([Move(0, 0, A) for A in moved])
+    if P is None:
         return None
     back = np.linalg.inv(T)
-    return back.T @ P.value @ back
+    return back.T @ P[0] @ back
 
 
-def dwell_samples(loops: list[np.ndarray]) -> int | None:
+def share_a_function(loops: Sequence[np.ndarray]) -> bool:
+    """Whether a common function was found, be it one that they hardly shrink.
+
+    Of many loops most hold nothing back, and a matrix inequality is dear: the problem begins with a
+    few, and those that grow under their function join them until none does.
+    """
+    moves = [Move(0, 0, A) for A in _evenly(loops)[0]]
+    asked, P = [], np.eye(len(moves[0].M))[None]
+    while growing := [m for m in moves if _growth(m, P) >= MOST]:
+        asked += sorted(growing, key=lambda m: -_growth(m, P))[:JOINING]
+        P = _shrinking(asked)
+        if P is None:
+            return False
+    return True
+
+
+def dwell_samples(loops: Sequence[np.ndarray]) -> int | None:
     """Fewest samples in each loop for which stability is proved, None where there are none."""
     most = 1
     while not _dwells(loops, most):
@@ -124,19 +133,44 @@ def dwell_samples(loops: list[np.ndarray]) -> int | None:
     return most
 
 
-def _dwells(loops: list[np.ndarray], samples: int) -> bool:
+def _dwells(loops: Sequence[np.ndarray], samples: int) -> bool:
     """True when functions P_i were found, and checked, for this dwell time."""
-    import cvxpy as cp
-
-    n, T = len(loops[0]), [_coordinates(A) for A in loops]
-    P, gain = [cp.Variable((n, n), symmetric=True) for _ in loops], cp.Variable()
-    moves = {}
+    T = [_coordinates(A) for A in loops]
+    moves = []
     for i, j in product(range(len(loops)), repeat=2):
         power = np.linalg.matrix_power(loops[i], 1 if i == j else samples)
-        moves[i, j] = np.linalg.solve(T[j], power @ T[i])
-    shrinks = [P[i] - M.T @ P[j] @ M >> gain * np.eye(n) for (i, j), M in moves.items()]
-    _solve(cp.Problem(cp.Maximize(gain), [*(each << np.eye(n) for each in P), *shrinks]))
-    return _holds([(M, P[j].value, P[i].value) for (i, j), M in moves.items()])
+        moves.append(Move(i, j, np.linalg.solve(T[j], power @ T[i])))
+    evenly = np.repeat(np.eye(len(T[0]))[None], len(T), axis=0)
+    return _hold(moves, evenly) or _shrinking(moves) is not None
+
+
+@dataclass(frozen=True)
+class Move:
+    """x goes to M x, its function from P[before] to P[after]: M' P[after] M < P[before]."""
+
+    before: int
+    after: int
+    M: np.ndarray
+
+
+def _evenly(loops: Sequence[np.ndarray]) -> tuple[list[np.ndarray], np.ndarray]:
+    """Loops in coordinates in which the first one shrinks evenly, and T of x = T z."""
+    T = _coordinates(loops[0])
+    return [np.linalg.solve(T, A @ T) for A in loops], T
+
+
+def _shrinking(moves: Sequence[Move]) -> np.ndarray | None:
+    """Functions P <= I, (number, n, n), that the moves shrink most; None where they shrink none."""
+    import cvxpy as cp
+
+    if any(_radius(each.M) >= 1.0 for each in moves if each.before == each.after):
+        return None
+    one, number = np.eye(len(moves[0].M)), 1 + max(each.before for each in moves)
+    P, gain = [cp.Variable(one.shape, symmetric=True) for _ in range(number)], cp.Variable()
+    shrinks = [P[e.before] - e.M.T @ P[e.after] @ e.M >> gain * one for e in moves]
+    _solve(cp.Problem(cp.Maximize(gain), [*(each << one for each in P), *shrinks]))
+    found = None if gain.value is None else np.array([each.value for each in P])
+    return found if found is not None and _hold(moves, found) else None
 
 
 def _solve(problem) -> None:
@@ -148,26 +182,19 @@ def _solve(problem) -> None:
         problem.solve(solver=cp.CLARABEL)
 
 
-def _holds(shrinks: list[tuple[np.ndarray, np.ndarray | None, np.ndarray | None]]) -> bool:
-    """True when M' P M < Q, with P and Q positive, for each (M, P, Q)."""
-    return all(
-        P is not None
-        and Q is not None
-        and _positive(P)
-        and _positive(Q)
-        and _growth(M, P, Q) < MOST
-        for M, P, Q in shrinks
-    )
+def _hold(moves: Sequence[Move], P: np.ndarray) -> bool:
+    """True where all functions are positive and every move shrinks its own."""
+    return all(map(_positive, P)) and all(_growth(each, P) < MOST for each in moves)
 
 
-def _decay_per_s(P: np.ndarray, loops: list[np.ndarray], sample_time_s: float) -> float:
-    most = max(_growth(A, P, P) for A in loops)
+def _decay_per_s(P: np.ndarray, loops: Sequence[np.ndarray], sample_time_s: float) -> float:
+    most = max(_growth(Move(0, 0, A), P[None]) for A in loops)
     return float(-np.log(most) / (2.0 * sample_time_s))
 
 
-def _growth(M: np.ndarray, P: np.ndarray, Q: np.ndarray) -> float:
-    """Largest ratio of x' M' P M x to x' Q x."""
-    return float(eigvalsh(M.T @ P @ M, Q)[-1])
+def _growth(move: Move, P: np.ndarray) -> float:
+    """Largest ratio of the function after a move to the one before."""
+    return float(eigvalsh(move.M.T @ P[move.after] @ move.M, P[move.before])[-1])
 
 
 def _positive(P: np.ndarray) -> bool:

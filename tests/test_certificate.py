@@ -1,12 +1,20 @@
 """Stability across modes: textbook pairs of loops, and the loops of the designs."""
 
+from unittest.mock import patch
+
 import numpy as np
 import pytest
 from crr_loops import ARM, TURNS
 from scipy.linalg import expm
 
 from controllers import CONTROLLERS
-from controllers.certificate import Certificate, certificate, common_function, dwell_samples
+from controllers.certificate import (
+    Certificate,
+    certificate,
+    common_function,
+    dwell_samples,
+    share_a_function,
+)
 from controllers.margins import closed, integral_of, loops, unforeseen_s
 from controllers.regulator import RegulatorSpec, regulator
 from controllers.scheduled import driven_modes
@@ -81,6 +89,16 @@ def test_the_function_of_one_loop_is_found_by_scipy_too():
     assert np.linalg.eigvalsh(found - A.T @ found @ A)[0] > 0.0
 
 
+@pytest.mark.parametrize(("spread", "shared"), [(0.5, True), (12.0, False)])
+def test_of_many_loops_a_few_tell_whether_all_share_a_function(spread, shared):
+    """A scatter of spirals, narrow enough for a common function and too wide for one."""
+    rates = np.random.default_rng(3).uniform(1.0, 1.0 + spread, (30, 2))
+    many = [expm(np.array([[-0.5, a], [-b, -0.5]]) * DT) for a, b in rates]
+
+    assert share_a_function(many) == (common_function(many) is not None) == shared
+    assert not share_a_function([*many, 1.01 * np.eye(2)])
+
+
 def test_with_an_unstable_mode_nothing_is_certified_and_it_is_named():
     found = certificate({"calm": (0.5 * np.eye(2),), "wild": (1.01 * np.eye(2),)}, DT)
 
@@ -140,8 +158,6 @@ def test_what_is_certified_is_told_with_every_pair_and_no_more_than_was_found(
 
 def test_a_dwell_time_of_one_sample_is_any_switching():
     """Loops that commute, seen without their common function."""
-    from unittest.mock import patch
-
     calm, calmer = (0.5 * np.eye(2),), (0.4 * np.eye(2),)
     with patch("controllers.certificate.common_function", return_value=None):
         found = certificate({"calm": calm, "calmer": calmer}, DT)
