@@ -40,32 +40,32 @@ def held(controller, position_m):
     return np.full((1, controller.preview), position_m)
 
 
+UNITS = {"position": 1e-3, "velocity": 0.1, "pressure a": 1e4, "pressure b": 1e4}
+
+
 def oracle(program, spec, x, targets, without=""):
-    """The same problem stage by stage for cvxpy, shape (N,); last opening 0.3 V, steady 0.1 V."""
-    n = program.horizon
+    """The same problem with its states for cvxpy, shape (N,); last opening 0.3 V, steady 0.1 V."""
+    n, unit = program.horizon, np.array([*UNITS.values()])
     F, G = program.free[:4], program.forced[:4, :1]
-    stage, last = program.Q[:4, :4], program.Q[-4:, -4:]
-    u, slack = cp.Variable(n), cp.Variable(5, nonneg=True)
-    cost, limits = spec.slack_weight * cp.sum_squares(slack), []
+    stage, last = (np.linalg.cholesky(Q).T for Q in (program.Q[:4, :4], program.Q[-4:, -4:]))
+    u, slack, z = cp.Variable((1, n)), cp.Variable(5, nonneg=True), cp.Variable((4, n))
+    X = cp.diag(unit) @ z
+    off, moves = X - targets[:4, None], cp.diff(cp.hstack([np.array([[0.3]]), u]), axis=1)
+    cost = spec.slack_weight * cp.sum_squares(slack)
     cost += spec.slack_price * (slack @ [0.1, 1.0, 1.0, 1.0, 10.0])
-    units = {"position": 1e-3, "velocity": 0.1, "pressure a": 1e4, "pressure b": 1e4}
-    low = [spec.margin_m, -spec.fastest_m_s, spec.lowest_pa, spec.lowest_pa]
-    high = [0.29 - spec.margin_m, spec.fastest_m_s, *[7e5 - spec.below_supply_pa] * 2]
-    for i in range(n):
-        x = F @ x + G[:, 0] * u[i] + program.drift[:4]
-        root = np.linalg.cholesky(last if i == n - 1 else stage).T
-        move = u[i] - (u[i - 1] if i else 0.3)
-        cost += cp.sum_squares(root @ (x - targets[:4])) + program.R * cp.square(u[i] - 0.1)
-        cost += program.S * cp.square(move)
-        limits += [u[i] >= program.limits.openings[0], u[i] <= program.limits.openings[1]]
-        if without != "rate":
-            limits += [cp.abs(move) <= spec.rate_v_s * spec.sample_time_s + slack[4]]
-        for k, (name, unit) in enumerate(units.items()):
-            if without != name:
-                limits += [x[k] / unit >= low[k] / unit - slack[k]]
-                limits += [x[k] / unit <= high[k] / unit + slack[k]]
+    cost += cp.sum_squares(stage @ off[:, :-1]) + cp.sum_squares(last @ off[:, -1])
+    cost += program.R * cp.sum_squares(u - 0.1) + program.S * cp.sum_squares(moves)
+    after = F @ cp.hstack([x[:, None], X[:, :-1]]) + G @ u + program.drift[:4, None]
+    limits = [z == cp.diag(1.0 / unit) @ after]
+    limits += [u >= program.limits.openings[0], u <= program.limits.openings[1]]
+    if without != "rate":
+        limits += [cp.abs(moves) <= spec.rate_v_s * spec.sample_time_s + slack[4]]
+    low = [spec.margin_m, -spec.fastest_m_s, spec.lowest_pa, spec.lowest_pa] / unit
+    high = [0.29 - spec.margin_m, spec.fastest_m_s, *[7e5 - spec.below_supply_pa] * 2] / unit
+    for k in (k for k, name in enumerate(UNITS) if name != without):
+        limits += [z[k] >= low[k] - slack[k], z[k] <= high[k] + slack[k]]
     cp.Problem(cp.Minimize(cost), limits).solve(solver=cp.CLARABEL)
-    return u.value
+    return u.value[0]
 
 
 LIMITS = {
