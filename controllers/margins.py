@@ -28,6 +28,7 @@ from math import inf, pi, tau
 import numpy as np
 
 from controllers.axis import Axis
+from controllers.crossings import LoopResponse, negative_crossings, unit_crossings
 from controllers.scheduled import Schedule, driven_modes
 from linearize.discrete import sampled
 from linearize.modes import HybridModel, Mode
@@ -174,17 +175,14 @@ def both_ways_s(plant: Plant) -> float:
 
 def margins_of(mode: Mode, law: Law, sample_time_s: float, delay_s: float = 0.0) -> Margins:
     """The margins of one mode, ``delay_s`` being in the loop already."""
-    import control
-
     A, B, C = loop(mode, law, sample_time_s, delay_s)
-    system = control.ss(A, B, C, 0.0, sample_time_s)
+    response = LoopResponse(A, B, C, sample_time_s)
     omega = np.geomspace(LOWEST_RAD_S, pi / sample_time_s, POINTS)
-    values = system(np.exp(1j * omega * sample_time_s))
-    response = control.frd(values, omega, smooth=True)
-    gains, _, _, _, crossings, _ = control.stability_margins(response, returnall=True)
+    values, crossings = response(omega), unit_crossings(response, omega)
+    gains = [*(-1.0 / response(negative_crossings(response, omega)).real)]
     if values[-1].real < 0.0:  # at half the sampling rate L ends on the real axis: a crossing too
-        gains = [*gains, -1.0 / values[-1].real]
-    phases = [np.angle(-complex(response(1j * w))) % tau for w in crossings]
+        gains.append(-1.0 / values[-1].real)
+    phases = np.angle(-response(crossings)) % tau
     return Margins(
         mode=mode.name,
         gain=(_most(g for g in gains if g < 1.0), _least(g for g in gains if g > 1.0)),

@@ -60,8 +60,8 @@ def test_a_sampled_integrator_has_the_margins_of_the_textbook(hybrid):
 
     assert found.stable
     assert found.gain == (0.0, pytest.approx(2.0 / (K * DT), rel=1e-6))
-    assert found.phase_rad == pytest.approx(pi / 2.0 - turn / 2.0, rel=1e-4)
-    assert found.delay_s == pytest.approx((pi / 2.0 - turn / 2.0) / (turn / DT), rel=1e-4)
+    assert found.phase_rad == pytest.approx(pi / 2.0 - turn / 2.0, rel=1e-9)
+    assert found.delay_s == pytest.approx((pi / 2.0 - turn / 2.0) / (turn / DT), rel=1e-9)
 
 
 @pytest.mark.parametrize("delay_s", [DT, 1.4 * DT, 3.0 * DT])
@@ -96,6 +96,26 @@ def test_a_line_delays_the_loop_as_a_network_does():
 
     assert both_ways_s(tube) == pytest.approx(both_ways_s(network)) == 5.0 / SOUND_M_S
     assert "line_delay" in [each.what for each in design_model(tube).left_out]
+
+
+@everyone
+def test_gain_and_phase_margins_are_those_of_python_control(controllers, hybrid, name):
+    """Of one mode: its crossings on an interpolated response, ours on the loop itself."""
+    import control
+
+    made = controllers[name]
+    mode, law = driven_modes(hybrid)[0][1], made.laws.forward[1]
+    found = margins_of(mode, law, made.sample_time_s)
+    A, B, C = loop(mode, law, made.sample_time_s)
+    omega = np.geomspace(0.1, pi / made.sample_time_s, 2000)
+    values = control.ss(A, B, C, 0.0, made.sample_time_s)(np.exp(1j * omega * made.sample_time_s))
+    response = control.frd(values, omega, smooth=True)
+    gains, phases_deg, _, _, _, _ = control.stability_margins(response, returnall=True)
+    ends = [*gains, *([-1.0 / values[-1].real] if values[-1].real < 0.0 else [])]
+
+    assert found.gain[0] == pytest.approx(max((g for g in ends if g < 1.0), default=0.0), rel=1e-5)
+    assert found.gain[1] == pytest.approx(min((g for g in ends if g > 1.0), default=inf), rel=1e-5)
+    assert np.degrees(found.phase_rad) == pytest.approx(np.abs(phases_deg).min(), rel=1e-5)
 
 
 def test_disk_margins_are_those_of_python_control(hybrid):
