@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 SINGLE_MAPS = 64  # more modes have no map each
 ACROSS, LETTERS = 6, 26  # maps side by side, and letters of a line above one
+MARGIN = 0.15  # of the range of all poles, beyond them in each map
 MOST_BESIDE = 6  # labels of a line of the legend
 MARKERS = ("o", "s", "^", "D", "v", "x")
 COLOURS = (BLUE, RED, GREEN, ORANGE)
@@ -72,29 +73,40 @@ def mode_poles_figure(hybrid: HybridModel) -> Figure:
     number = len(hybrid.modes)
     across = min(ACROSS, number)
     down = -(-number // across)
+    by_mode = [np.linalg.eigvals(mode.A) for mode in hybrid.modes]
+    every = np.concatenate(by_mode)
+    # not shared axes: each of sixty would ask all others of their ends
+    ends = {"xlim": _with_margin(every.real), "ylim": _with_margin(every.imag)}
     with styled():
         figure = new_figure(PAGE_IN, 0.8 + 1.05 * down)
-        grid = figure.subplots(down, across, sharex=True, sharey=True, squeeze=False)
+        grid = figure.subplots(down, across, squeeze=False)
         for panel in grid.ravel()[number:]:
             panel.remove()
         for k, (panel, mode) in enumerate(zip(grid.ravel(), hybrid.modes, strict=False)):
-            poles = np.linalg.eigvals(mode.A)
             panel.axvline(0.0, color="0.4", linewidth=0.6)
             panel.plot(
-                poles.real,
-                poles.imag,
+                by_mode[k].real,
+                by_mode[k].imag,
                 "x",
                 color=BLUE,
                 markersize=4,
                 linestyle="none",
                 label="pole",
             )
-            panel.margins(0.15)
+            panel.set(**ends)
             panel.set_title("\n".join(wrap(f"{k + 1}  {mode.name}", LETTERS)), fontsize=5.5)
-            panel.tick_params(labelsize=6, labelbottom=k + across >= number)
+            below = k + across >= number
+            panel.tick_params(labelsize=6, labelbottom=below, labelleft=k % across == 0)
         figure.supxlabel("real part (1/s)", fontsize=8)
         figure.supylabel("imaginary part (rad/s)", fontsize=8)
     return figure
+
+
+def _with_margin(values: np.ndarray) -> tuple[float, float]:
+    """Ends of an axis that holds the values, and zero, with room for their marks."""
+    low, high = min(0.0, values.min()), max(0.0, values.max())
+    room = MARGIN * (high - low or 1.0)
+    return low - room, high + room
 
 
 def _cuts(hybrid: HybridModel) -> tuple[str, str]:

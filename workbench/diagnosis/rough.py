@@ -23,6 +23,7 @@ from workbench.fitting.costs import points_costs
 from workbench.fitting.gauss_newton import Fit, fit_windows, follow
 from workbench.fitting.linearised import Point, borrowed
 from workbench.fitting.problem import Problem, staged
+from workbench.fitting.pulled_in import gone_far
 from workbench.fitting.start_states import carried
 from workbench.fitting.unknowns import Unknowns
 from workbench.fitting.windows import Windows
@@ -32,6 +33,7 @@ SHARES = (2.0, 1.0, 0.5, 0.0)  # of the linear step of the nuisances that goes w
 ITERATIONS = 4
 KEPT = 0.5  # of what the scan promised: a first fit that keeps less tries a larger size
 WORTH_LARGER = 0.1  # of the misfit, that the scan must promise for that
+NEARER = (0.7, 0.5)  # of the way from the priors to the base
 WORTH_TRYING = 5.0  # times the cost of the best start
 
 
@@ -68,6 +70,7 @@ def rough_fit(problem: Problem, profile: Profile, most: int = STARTS) -> Rough:
     worth = profile.drop > WORTH_LARGER * problem.misfit
     if worth and base.cost - fit.cost < KEPT * profile.drop:
         further = _from_larger(problem, windows, unknowns, profile)
+        further += _from_nearer(problem, windows, unknowns, profile)
         fit = min((fit, *further), key=lambda each: each.cost)
     return Rough(profile, fit, (base.cost - fit.cost) / problem.misfit)
 
@@ -88,6 +91,29 @@ def _from_larger(
     points, _ = _starts(problem, windows, unknowns, replace(profile, trials=(larger[0],)), 1)
     start = points_costs(windows, unknowns, points).best
     return [fit_windows(windows, unknowns, start, 2 * ITERATIONS)]
+
+
+def _from_nearer(
+    problem: Problem, windows: Windows, unknowns: Unknowns, profile: Profile
+) -> list[Fit]:
+    """Fits from between the base and the priors, where the base has gone far from them.
+
+    A base that imitates what is missing rests in a narrow valley beside the one of the effect: with
+    the effect in its place no step leads out of it, and from the priors the way is long.
+    """
+    base = problem.base
+    if not gone_far(base):
+        return []
+    starts, fits = carried(base.point.starts, base.windows, windows), []
+    for share in NEARER:
+        between = base.unknowns.values(base.unknowns.clipped(share * base.point.t))
+        points = []
+        for trial in _distinct(profile.trials, STARTS):
+            values = {**windows.plant.values, **between, **trial.values}
+            points.append(Point(unknowns.clipped(unknowns.scaled(values)), starts))
+        start = points_costs(windows, unknowns, points).best
+        fits.append(fit_windows(windows, unknowns, start, 2 * ITERATIONS))
+    return fits
 
 
 def _beyond(trial: Trial, best: Trial) -> bool:

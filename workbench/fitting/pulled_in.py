@@ -29,11 +29,17 @@ def pulled_in(fit: Fit, iterations: int) -> Fit:
 
     Where none has gone further than 1.5 deviations of its prior, none imitates much: the fit stays.
     """
+    if not gone_far(fit):
+        return fit
     unknowns, t = fit.unknowns, fit.point.t
     nuisances = unknowns.precision >= 1.0
-    if not np.any(np.abs(t[nuisances]) > FAR):
-        return fit
     nearer = (np.where(nuisances, share * t, t) for share in SHARES)
     points = [Point(unknowns.clipped(each), fit.point.starts) for each in nearer]
     best = lowest_from(fit, points, iterations)
     return min(fit, best, key=lambda each: each.cost)
+
+
+def gone_far(fit: Fit) -> bool:
+    """Whether a fit has taken a parameter far from its prior."""
+    nuisances = fit.unknowns.precision >= 1.0
+    return bool(np.any(np.abs(fit.point.t[nuisances]) > FAR))
