@@ -92,11 +92,12 @@ def test_an_accepted_row_leads_one_that_fails_a_criterion(problem, followed, sou
 
 
 def test_a_row_that_was_left_behind_says_at_which_stage(problem, followed):
-    begun = {p.candidate.name: 0.05 for p in followed.profiles[:1]}
-    rows = ranked(problem, followed.profiles, [], [], begun)
+    one, other = (p.candidate.name for p in followed.profiles[:2])
+    rows = ranked(problem, followed.profiles, [], [], {one: 0.05, other: -0.2})
     reasons = {row.candidate.name: row.reasons for row in rows}
 
-    assert "after a first fit, which removed 5%" in reasons[followed.profiles[0].candidate.name][0]
+    assert "after a first fit, which removed 5%" in reasons[one][0]
+    assert "no first fit with it came as low as the prior fit" in reasons[other][0]
     assert all(r.reasons != ("not among the best of the scan",) for r in rows if r.drop_train <= 0)
 
 

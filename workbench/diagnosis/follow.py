@@ -183,8 +183,10 @@ def _from_the_leader(
     for name in dict.fromkeys(rivals):
         if name != leader.candidate.name:
             progress(f"refit with {name} from another place")
-            again = _beside(problem, leader, by_name[name], found.get(name))
-            found[name] = min((again, found.get(name, again)), key=lambda each: each.fit.cost)
+            known = found.get(name)
+            again = _beside(problem, leader, by_name[name], known)
+            if known or again.drop_train > 0.0:  # above the base it tells nothing of a rival
+                found[name] = min(again, known or again, key=lambda each: each.fit.cost)
     return _best_first(problem, [*found.values()])
 
 

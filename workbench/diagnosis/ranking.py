@@ -158,7 +158,9 @@ def _scanned_row(problem: Problem, profile: Profile, begun: Mapping[str, float])
     name = profile.candidate.name
     reason = "not among the best of the scan"
     if name in begun:
-        reason = f"left behind after a first fit, which removed {max(begun[name], 0.0):.0%}"
+        reason = f"left behind after a first fit, which removed {begun[name]:.0%}"
+        if begun[name] < 0.0:
+            reason = "left behind: no first fit with it came as low as the prior fit"
     elif profile.drop <= 0.0:
         reason = "brings nothing"
     row = Ranked(

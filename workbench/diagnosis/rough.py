@@ -4,7 +4,8 @@ The scan is linear in the nuisances, and where they have moved far to imitate an
 not to be trusted.  A short fit with the derivatives of the base is cheap, and tells the few that
 are worth a long one.  A fit from one poor start can end far from the minimum, and the scan
 hands over good ones: its best sizes with the linear step of the nuisances, with more of it, and
-with none, each tried and the best followed.
+with none, each tried and the best followed.  One that keeps little of what the scan promised begins
+once more from a larger size, and where the base has gone far from the priors between the two.
 
 Source: diagnosis.md 1.5; the idea of following many for a short time and few for long is that of
 successive halving (Jamieson and Talwalkar 2016).
@@ -31,7 +32,7 @@ from workbench.fitting.windows import Windows
 STARTS = 2  # sizes of the scan that are tried
 SHARES = (2.0, 1.0, 0.5, 0.0)  # of the linear step of the nuisances that goes with each
 ITERATIONS = 4
-KEPT = 0.5  # of what the scan promised: a first fit that keeps less tries a larger size
+KEPT = 0.5  # of what the scan promised: a first fit that keeps less begins from other places too
 WORTH_LARGER = 0.1  # of the misfit, that the scan must promise for that
 NEARER = (0.7, 0.5)  # of the way from the priors to the base
 WORTH_TRYING = 5.0  # times the cost of the best start
