@@ -95,6 +95,8 @@ def common_function(loops: Sequence[np.ndarray]) -> np.ndarray | None:
     Maximises by how much all of them shrink x'Px, in coordinates in which the first loop does so
     evenly: the poles of a slow integral and a fast lag are far apart.
     """
+    if any(_radius(A) >= 1.0 for A in loops):
+        return None
     moved, T = _evenly(loops)
     P = _shrinking([Move(0, 0, A) for A in moved])
     if P is None:
@@ -109,6 +111,8 @@ def share_a_function(loops: Sequence[np.ndarray]) -> bool:
     Of many loops most hold nothing back, and a matrix inequality is dear: the problem begins with a
     few, and those that grow under their function join them until none does.
     """
+    if any(_radius(A) >= 1.0 for A in loops):
+        return False
     moves = [Move(0, 0, A) for A in _evenly(loops)[0]]
     asked, P = [], np.eye(len(moves[0].M))[None]
     while growing := [m for m in moves if _growth(m, P) >= MOST]:
@@ -163,8 +167,6 @@ def _shrinking(moves: Sequence[Move]) -> np.ndarray | None:
     """Functions P <= I, (number, n, n), that the moves shrink most; None where they shrink none."""
     import cvxpy as cp
 
-    if any(_radius(each.M) >= 1.0 for each in moves if each.before == each.after):
-        return None
     one, number = np.eye(len(moves[0].M)), 1 + max(each.before for each in moves)
     P, gain = [cp.Variable(one.shape, symmetric=True) for _ in range(number)], cp.Variable()
     shrinks = [P[e.before] - e.M.T @ P[e.after] @ e.M >> gain * one for e in moves]

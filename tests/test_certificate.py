@@ -96,7 +96,8 @@ def test_of_many_loops_a_few_tell_whether_all_share_a_function(spread, shared):
     many = [expm(np.array([[-0.5, a], [-b, -0.5]]) * DT) for a, b in rates]
 
     assert share_a_function(many) == (common_function(many) is not None) == shared
-    assert not share_a_function([*many, 1.01 * np.eye(2)])
+    for wild in ([*many, 1.01 * np.eye(2)], [1.01 * np.eye(2), *many]):
+        assert not share_a_function(wild) and common_function(wild) is None
 
 
 def test_with_an_unstable_mode_nothing_is_certified_and_it_is_named():
