@@ -24,7 +24,7 @@ from workbench.fitting.costs import points_costs
 from workbench.fitting.gauss_newton import Fit, fit_windows, follow
 from workbench.fitting.linearised import Point, borrowed
 from workbench.fitting.problem import Problem, staged
-from workbench.fitting.pulled_in import gone_far
+from workbench.fitting.pulled_in import gone_far, towards_priors
 from workbench.fitting.start_states import carried
 from workbench.fitting.unknowns import Unknowns
 from workbench.fitting.windows import Windows
@@ -107,7 +107,7 @@ def _from_nearer(
         return []
     starts, fits = carried(base.point.starts, base.windows, windows), []
     for share in NEARER:
-        between = base.unknowns.values(base.unknowns.clipped(share * base.point.t))
+        between = base.unknowns.values(towards_priors(base, share))
         points = []
         for trial in _distinct(profile.trials, STARTS):
             values = {**windows.plant.values, **between, **trial.values}

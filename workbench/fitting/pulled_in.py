@@ -31,15 +31,24 @@ def pulled_in(fit: Fit, iterations: int) -> Fit:
     """
     if not gone_far(fit):
         return fit
-    unknowns, t = fit.unknowns, fit.point.t
-    nuisances = unknowns.precision >= 1.0
-    nearer = (np.where(nuisances, share * t, t) for share in SHARES)
-    points = [Point(unknowns.clipped(each), fit.point.starts) for each in nearer]
+    points = [Point(towards_priors(fit, share), fit.point.starts) for share in SHARES]
     best = lowest_from(fit, points, iterations)
     return min(fit, best, key=lambda each: each.cost)
 
 
 def gone_far(fit: Fit) -> bool:
     """Whether a fit has taken a parameter far from its prior."""
-    nuisances = fit.unknowns.precision >= 1.0
-    return bool(np.any(np.abs(fit.point.t[nuisances]) > FAR))
+    return bool(np.any(np.abs(fit.point.t[_with_prior(fit)]) > FAR))
+
+
+def towards_priors(fit: Fit, share: float) -> np.ndarray:
+    """The scaled unknowns of a fit, (n_p,), with so much left of the way from the priors.
+
+    What was added has no prior, and stays.
+    """
+    t = fit.point.t
+    return fit.unknowns.clipped(np.where(_with_prior(fit), share * t, t))
+
+
+def _with_prior(fit: Fit) -> np.ndarray:
+    return fit.unknowns.precision >= 1.0
