@@ -29,7 +29,8 @@ lint: $(READY)
 	@$(BIN)/ruff format --check --quiet .
 
 # Every package comes as a wheel whose hash is in requirements.lock: nothing is compiled here,
-# and a package that differs from the locked one stops the set-up.
+# and a package that differs from the locked one stops the set-up. Python compiles what it imports,
+# which is a small part of them.
 $(READY): requirements.lock compiler.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' || { \
 	  echo "$(PYTHON) is $$($(PYTHON) --version 2>&1); the workbench needs Python 3.11 to 3.13:" \
@@ -42,7 +43,7 @@ ifdef UV
 	@VIRTUAL_ENV=.venv uv pip install --quiet --no-deps --no-build-isolation -e .
 else
 	@$(PYTHON) -m venv .venv
-	@$(BIN)/python -m pip -qq --disable-pip-version-check install \
+	@$(BIN)/python -m pip -qq --disable-pip-version-check install --no-compile \
 	  --require-hashes --only-binary :all: $(LOCKS)
 	@$(BIN)/python -m pip -qq --disable-pip-version-check install \
 	  --no-deps --no-build-isolation -e .

@@ -110,8 +110,8 @@ def at_limits(number: int) -> dict[str, Timed]:
     }
 
 
-def on_the_drive(rounds: int) -> dict[str, Timed]:
-    """Whole calls over a step of the whole plant."""
+def on_the_drive(rounds: int, by_rival: int = 20) -> dict[str, Timed]:
+    """Whole calls over a step of the whole plant, and so many of IPOPT, which are slow."""
     hybrid, plant = standard_modes(servo_drive()), servo_drive().lean()
     linear, nonlinear = linear_mpc(hybrid, SPEC), nonlinear_mpc(hybrid, SPEC)
     whole = on_whole_plant(nonlinear, plant, SPEC)
@@ -121,7 +121,7 @@ def on_the_drive(rounds: int) -> dict[str, Timed]:
         runs = [whole_calls(made, record, plant.model.states, CALLS) for _ in range(rounds)]
         sound = all(note["fallback"] == 0.0 for _, notes in runs for note in notes)
         rows[name] = Timed(np.concatenate([times for times, _ in runs]), sound=sound)
-    return rows | {IPOPT: Timed(by_ipopt(nonlinear, 20))}
+    return rows | {IPOPT: Timed(by_ipopt(nonlinear, by_rival))}
 
 
 def on_the_gearbox(rounds: int) -> dict[str, Timed]:

@@ -36,8 +36,10 @@ def test_the_bandwidth_that_a_refusal_names_is_one_that_all_modes_allow(plant):
 
 @pytest.mark.parametrize(
     ("plant", "gains", "stable"),
-    [(crr_rig(), (250.0, 200.0, 8.0), True), (crr_arm(), (4.0, 4.0, 0.4), False)],
-    ids=["crr_rig", "crr_arm"],
+    [
+        pytest.param(crr_rig(), (250.0, 200.0, 8.0), True, id="crr_rig", marks=pytest.mark.slow),
+        pytest.param(crr_arm(), (4.0, 4.0, 0.4), False, id="crr_arm"),
+    ],
 )
 def test_the_gains_of_the_papers_are_given_in_a_table_of_the_specification(
     tmp_path, plant, gains, stable

@@ -95,11 +95,12 @@ def test_a_filter_that_is_told_what_arrives_leaves_the_poles_of_loop_and_filter(
             "lq",
             "with 20 ms of the commands, foreseen by each mode",
         ),
-        (
+        pytest.param(
             'plant = "crr_rig"\n',
             "axis-pid",
             "with 1 ms of the sensors and 1 ms of the commands; the law acts on the measurement "
             "itself and foresees nothing, as under `check --estimator raw`",
+            marks=pytest.mark.slow,
         ),
         ('plant = "servo_drive"\n', "lq", "without delays; all states are taken as known"),
     ],

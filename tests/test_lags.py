@@ -108,7 +108,7 @@ def test_the_lag_of_a_sensor_is_in_the_loop_of_a_law_on_that_sensor_alone(slow):
     assert lags_of(both, lq) == (Lag("spool", LED_S),)
 
 
-@pytest.mark.parametrize("method", ["axis-pid", "lq"])
+@pytest.mark.parametrize("method", [pytest.param("axis-pid", marks=pytest.mark.slow), "lq"])
 def test_margins_certificate_and_filter_of_a_design_have_the_lag(slow, method):
     """They were those of the drive without it, though the reduction had said they hold it."""
     found = design(method, slow)

@@ -22,7 +22,7 @@ from studies.control_speed_study import (
 
 @pytest.fixture(scope="module")
 def rows():
-    return at_limits(60) | on_the_drive(1) | on_the_gearbox(1)
+    return at_limits(60) | on_the_drive(1, 3) | on_the_gearbox(1)
 
 
 def test_every_solver_finds_the_input_at_a_limit_to_a_millivolt(rows):
