@@ -54,4 +54,4 @@ def test_effects_that_throttle_air_alike_are_all_told_though_the_prior_fit_imita
     (own,) = (r for r in (first, *others) if r.candidate.name == "supply_restriction")
 
     assert {"supply_restriction", "discharge_asymmetry", "flow_shape"} <= alike
-    assert own.size["valve.supply_restriction"].value == pytest.approx(case.size, rel=0.1)
+    assert own.size[own.candidate.strength].value == pytest.approx(case.size, rel=0.1)
