@@ -29,20 +29,21 @@ class LoopResponse:
         return (self.C @ states)[..., 0, 0]
 
 
-def unit_crossings(response: LoopResponse, omega: np.ndarray) -> np.ndarray:
-    """Frequencies at which |L| = 1, in rising order; ``omega`` is the grid, ``(n,)``."""
-    return _roots(lambda w: np.abs(response(w)) - 1.0, omega)
+def unit_crossings(response: LoopResponse, omega: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Frequencies at which |L| = 1, in rising order; ``values`` are L on the grid, (n,) each."""
+    return _roots(lambda w: np.abs(response(w)) - 1.0, omega, np.abs(values) - 1.0)
 
 
-def negative_crossings(response: LoopResponse, omega: np.ndarray) -> np.ndarray:
+def negative_crossings(response: LoopResponse, omega: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Frequencies at which L is real and negative, in rising order."""
-    real = _roots(lambda w: response(w).imag, omega)
+    real = _roots(lambda w: response(w).imag, omega, values.imag)
     return real[response(real).real < 0.0]
 
 
-def _roots(function: Callable[[np.ndarray], np.ndarray], omega: np.ndarray) -> np.ndarray:
+def _roots(
+    function: Callable[[float], np.ndarray], omega: np.ndarray, on_grid: np.ndarray
+) -> np.ndarray:
     from scipy.optimize import brentq
 
-    values = function(omega)
-    before = np.flatnonzero(values[:-1] * values[1:] < 0.0)
+    before = np.flatnonzero(on_grid[:-1] * on_grid[1:] < 0.0)
     return np.array([brentq(function, omega[k], omega[k + 1], rtol=1e-12) for k in before])

@@ -178,8 +178,9 @@ def margins_of(mode: Mode, law: Law, sample_time_s: float, delay_s: float = 0.0)
     A, B, C = loop(mode, law, sample_time_s, delay_s)
     response = LoopResponse(A, B, C, sample_time_s)
     omega = np.geomspace(LOWEST_RAD_S, pi / sample_time_s, POINTS)
-    values, crossings = response(omega), unit_crossings(response, omega)
-    gains = [*(-1.0 / response(negative_crossings(response, omega)).real)]
+    values = response(omega)
+    crossings = unit_crossings(response, omega, values)
+    gains = [*(-1.0 / response(negative_crossings(response, omega, values)).real)]
     if values[-1].real < 0.0:  # at half the sampling rate L ends on the real axis: a crossing too
         gains.append(-1.0 / values[-1].real)
     phases = np.angle(-response(crossings)) % tau

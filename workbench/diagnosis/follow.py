@@ -11,8 +11,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from workbench.diagnosis.judge import (
     CLOSE_DROP_SAME,
     LEAST_TRAINING,
@@ -36,6 +34,7 @@ from workbench.diagnosis.scan import Profile, scan_catalogue, scan_from_priors
 from workbench.diagnosis.shifts import Shift, shifts
 from workbench.diagnosis.where import acts_in
 from workbench.fitting.problem import Problem
+from workbench.fitting.pulled_in import gone_far
 
 FITTED_FIRST = 8  # candidates that are followed beyond the scan at the most
 WORTH_A_LOOK = 0.05  # of the best drop of the scan
@@ -141,9 +140,7 @@ def _from_priors(
     Parameters that have gone as far as is believed may stand in for a delay together, and hold each
     other there: no first fit from the base gives one of them back.
     """
-    base = problem.base
-    nuisances = base.unknowns.precision >= 1.0
-    if not np.any(np.abs(base.point.t[nuisances]) > IMPLAUSIBLE):
+    if not gone_far(problem.base, IMPLAUSIBLE):
         return
     for profile in imitated[:IMITATED]:
         if profile.drop > max(AS_MUCH * imitated[0].drop, problem.misfit):

@@ -36,9 +36,9 @@ def pulled_in(fit: Fit, iterations: int) -> Fit:
     return min(fit, best, key=lambda each: each.cost)
 
 
-def gone_far(fit: Fit) -> bool:
-    """Whether a fit has taken a parameter far from its prior."""
-    return bool(np.any(np.abs(fit.point.t[_with_prior(fit)]) > FAR))
+def gone_far(fit: Fit, deviations: float = FAR) -> bool:
+    """Whether a fit has taken a parameter further than so many deviations from its prior."""
+    return bool(np.any(np.abs(fit.point.t[_with_prior(fit)]) > deviations))
 
 
 def towards_priors(fit: Fit, share: float) -> np.ndarray:
