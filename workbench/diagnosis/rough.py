@@ -105,13 +105,11 @@ def _from_nearer(
     base = problem.base
     if not gone_far(base):
         return []
-    starts, fits = carried(base.point.starts, base.windows, windows), []
+    fits = []
     for share in NEARER:
-        between = base.unknowns.values(towards_priors(base, share))
-        points = []
-        for trial in _distinct(profile.trials, STARTS):
-            values = {**windows.plant.values, **between, **trial.values}
-            points.append(Point(unknowns.clipped(unknowns.scaled(values)), starts))
+        between = towards_priors(base, share)
+        trials = _distinct(profile.trials, STARTS)
+        points = [_point(problem, windows, unknowns, between, trial) for trial in trials]
         start = points_costs(windows, unknowns, points).best
         fits.append(fit_windows(windows, unknowns, start, 2 * ITERATIONS))
     return fits
@@ -160,14 +158,19 @@ def _starts(
     then the size that is best there is too small.  How many deviations that are says nothing: under
     wide priors little does as much.
     """
-    base = problem.base
-    starts = carried(base.point.starts, base.windows, windows)
-
-    def point(t: np.ndarray, trial: Trial) -> Point:
-        nominal = base.unknowns.values(base.unknowns.clipped(t))
-        values = {**windows.plant.values, **nominal, **trial.values}
-        return Point(unknowns.clipped(unknowns.scaled(values)), starts)
-
+    base, placed = problem.base, (problem, windows, unknowns)
     trials = _distinct(profile.trials, most)
-    near = [point(base.point.t + share * t.nuisance, t) for t in trials for share in SHARES]
-    return near, [point(problem.at_priors, trial) for trial in profile.trials]
+    steps = [(t, share * t.nuisance) for t in trials for share in SHARES]
+    near = [_point(*placed, base.point.t + step, trial) for trial, step in steps]
+    return near, [_point(*placed, problem.at_priors, trial) for trial in profile.trials]
+
+
+def _point(
+    problem: Problem, windows: Windows, unknowns: Unknowns, t: np.ndarray, trial: Trial
+) -> Point:
+    """A size of a candidate with all else at scaled unknowns (n_p,) of the base."""
+    base = problem.base
+    nominal = base.unknowns.values(base.unknowns.clipped(t))
+    values = {**windows.plant.values, **nominal, **trial.values}
+    starts = carried(base.point.starts, base.windows, windows)
+    return Point(unknowns.clipped(unknowns.scaled(values)), starts)
