@@ -11,7 +11,7 @@ from estimators import ESTIMATORS
 from studies.closed_loop_check import standard_estimator
 from workbench.filter_likelihoods import log_likelihoods
 from workbench.filter_passes import filter_pass, recording_filter, smooth
-from workbench.filtering import correct, predict, smoothed
+from workbench.filtering import correct, predict, smoothed, smoothed_covariances
 from workbench.plants.servo_drive import COMMAND, OUTPUTS, servo_drive
 from workbench.recording import Recording
 from workbench.simulation import simulate
@@ -131,7 +131,8 @@ def test_the_smoother_equals_rauch_tung_striebel():
         left.append(np.eye(2) - before @ C.T @ np.linalg.solve(S, C))
     every = np.broadcast_to(F, (len(x), 2, 2))
 
-    found, covariances = smoothed(x, P, every, np.array(said), np.array(weights), np.array(left))
+    found = smoothed(x, P, every, np.array(said), np.array(left))
+    covariances = smoothed_covariances(P, every, np.array(weights), np.array(left))
 
     assert found == pytest.approx(wanted, rel=1e-5, abs=1e-8)
     assert (covariances[:-1, 0, 0] < P[:-1, 0, 0]).all()

@@ -9,7 +9,7 @@ from scipy.linalg import expm
 
 from workbench.comparison.horizons import beside_measured
 from workbench.filter_passes import posed, recording_filter, smooth
-from workbench.filtering import consistent_start, smoothed, smoothed_covariances
+from workbench.filtering import consistent_start, smoothed, smoothed_covariances_behind
 from workbench.plant_filter import transition
 from workbench.plants.gearbox import gearbox
 from workbench.plants.servo_drive import COMMAND, OUTPUTS, servo_drive
@@ -75,7 +75,7 @@ def test_what_is_considered_is_not_corrected_but_its_uncertainty_counts():
 def held_back(mask, N=7, seed=0):
     """A filter of a drawn linear system whose gains are those of ``mask``: what it tells by sample.
 
-    Returns H, S and the arguments of :func:`smoothed_covariances`.
+    Returns H, S and the arguments of :func:`smoothed_covariances_behind`.
     """
     rng, n, n_y = np.random.default_rng(seed), 3, 2
     F, H = 0.6 * rng.standard_normal((N, n, n)), rng.standard_normal((N, n_y, n))
@@ -90,12 +90,12 @@ def held_back(mask, N=7, seed=0):
         told.append((S, P, seen @ H[k], left, np.hstack([K, seen])))
         ahead = F[k] @ (P + Q / 2) @ F[k].T + Q / 2
     S, P, weights, left, gains = map(np.array, zip(*told, strict=True))
-    return H, S, (P, F, weights, left, gains, Q)
+    return H, S, (gains, P, F, weights, left, Q)
 
 
 def smoothed_errors(H, S, known, drawn):
     """What the smoother misses, (N, n), where the noise is ``drawn``: start, then by sample."""
-    P, F, weights, left, gains, Q = known
+    gains, P, F, _, left, Q = known
     N, n = len(P), len(Q)
     kick, v = np.split(drawn[n:].reshape(N, -1), [2 * n], axis=1)
     kick = kick * np.tile(np.sqrt(Q.diagonal() / 2), 2)
@@ -107,7 +107,7 @@ def smoothed_errors(H, S, known, drawn):
         said.append(H[k].T @ np.linalg.solve(S[k], e))
         x = F[k] @ (x + kick[k, :n]) + kick[k, n:]
         ahead = F[k] @ filtered[k]
-    return smoothed(np.array(filtered), P, F, np.array(said), weights, left)[0] - true
+    return smoothed(np.array(filtered), P, F, np.array(said), left) - true
 
 
 @pytest.mark.parametrize("mask", [(1.0, 1.0, 1.0), (1.0, 1.0, 0.0)])
@@ -117,7 +117,7 @@ def test_smoothed_covariances_are_those_of_the_errors_whatever_the_gain(mask):
     every = [smoothed_errors(H, S, known, drawn) for drawn in np.eye(3 + 7 * 8)]
     true = sum(np.einsum("ki,kj->kij", error, error) for error in every)
 
-    np.testing.assert_allclose(smoothed_covariances(*known), true, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(smoothed_covariances_behind(*known), true, rtol=0.0, atol=1e-12)
 
 
 def test_a_smoothed_state_beside_a_bristle_is_never_certain():

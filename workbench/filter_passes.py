@@ -13,7 +13,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from workbench.called import called
-from workbench.filtering import consistent_start, smoothed, smoothed_covariances
+from workbench.filtering import (
+    consistent_start,
+    smoothed,
+    smoothed_covariances,
+    smoothed_covariances_behind,
+)
 from workbench.plant import Plant
 from workbench.plant_filter import PlantFilter
 from workbench.recording import Recording
@@ -229,10 +234,12 @@ def _apart(wide: np.ndarray, width: int) -> np.ndarray:
 
 
 def _smoothed(found: PlantFilter, one: _Pass) -> _Pass:
-    X, P = smoothed(one.X, one.P, one.F, one.said, one.weights, one.left)
-    if not found.corrected.all():
-        known = (one.P, one.F, one.weights, one.left, one.gains, one.Q)
+    known = (one.P, one.F, one.weights, one.left)
+    if found.corrected.all():
         P = smoothed_covariances(*known)
+    else:
+        P = smoothed_covariances_behind(one.gains, *known, one.Q)
+    X = smoothed(one.X, one.P, one.F, one.said, one.left)
     return replace(one, X=X, P=P)
 
 

@@ -42,42 +42,43 @@ def correct(
 
 
 def smoothed(
-    states: np.ndarray,
-    covariances: np.ndarray,
-    F: np.ndarray,
-    said: np.ndarray,
-    weights: np.ndarray,
-    left: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Smoothed states (n, n_x) and covariances (n, n_x, n_x) from the filtered ones.
+    states: np.ndarray, covariances: np.ndarray, F: np.ndarray, said: np.ndarray, left: np.ndarray
+) -> np.ndarray:
+    """Smoothed states (n, n_x) from the filtered ones.
 
     The Rauch-Tung-Striebel smoother in the adjoint form of Bryson and Frazier, which inverts no
     covariance: a state without noise, or one that friction holds, does no harm.
 
-    ``F[k]`` leads from sample k to k + 1; ``said`` = H' S^-1 e, ``weights`` = H' S^-1 H and
-    ``left`` = I - K H belong to the measurement of sample k.
-
-    The covariances hold behind the best gain; :func:`smoothed_covariances` gives those of others.
+    ``F[k]`` leads from sample k to k + 1; ``said`` = H' S^-1 e and ``left`` = I - K H belong to
+    the measurement of sample k.
 
     Source: Bierman 1973, "Fixed interval smoothing with discrete measurements".
     """
-    smooth, P = states.copy(), covariances.copy()
-    adjoint, information = np.zeros(states.shape[1]), np.zeros(covariances.shape[1:])
-    for k in range(len(states) - 1, -1, -1):
-        smooth[k] += covariances[k] @ adjoint
-        P[k] -= covariances[k] @ information @ covariances[k]
-        if k:
-            adjoint = F[k - 1].T @ (said[k] + left[k].T @ adjoint)
-            information = F[k - 1].T @ (weights[k] + left[k].T @ information @ left[k]) @ F[k - 1]
-    return smooth, P
+    onward = F[: len(states) - 1]
+    told, back = _times(_turned(onward), said[1:]), _turned(left[1:] @ onward)
+    adjoint = np.zeros(states.shape)
+    for k in range(len(states) - 1, 0, -1):
+        adjoint[k - 1] = told[k - 1] + back[k - 1] @ adjoint[k]
+    return states + _times(covariances, adjoint)
 
 
 def smoothed_covariances(
+    covariances: np.ndarray, F: np.ndarray, weights: np.ndarray, left: np.ndarray
+) -> np.ndarray:
+    """Covariances (n, n_x, n_x) of the states of :func:`smoothed` behind the best gain.
+
+    P - P I P, with I the information of later samples; ``weights`` = H' S^-1 H at each.
+    :func:`smoothed_covariances_behind` gives those of other gains.
+    """
+    return covariances - covariances @ _information(F, weights, left) @ covariances
+
+
+def smoothed_covariances_behind(
+    gains: np.ndarray,
     covariances: np.ndarray,
     F: np.ndarray,
     weights: np.ndarray,
     left: np.ndarray,
-    gains: np.ndarray,
     Q: np.ndarray,
 ) -> np.ndarray:
     """Covariances (n, n_x, n_x) of the states of :func:`smoothed` behind any gain.
@@ -91,20 +92,42 @@ def smoothed_covariances(
     ``gains`` = [K, H' S^-1], (n, n_x, 2 n_y), in units of the noise of the outputs; ``Q`` is what
     a state gains in a step, half of it before.
     """
-    unit, (n_x, columns) = np.eye(len(Q)), gains.shape[1:]
-    information, N, found = np.zeros((n_x, n_x)), np.zeros((n_x, n_x)), []
-    for k in range(len(covariances) - 1, -1, -1):
-        P = covariances[k]
-        rest = unit - P @ information
-        found.append(rest @ P @ rest.T + P @ N @ P)
-        if k:
-            K, seen = np.split(gains[k], [columns // 2], axis=1)
-            step, told = F[k - 1], weights[k] + left[k].T @ information @ left[k]
-            read = seen - left[k].T @ information @ K
-            gained = step @ (Q / 2.0) @ step.T + Q / 2.0
-            N = told @ gained @ told.T + read @ read.T + left[k].T @ N @ left[k]
-            N, information = step.T @ N @ step, step.T @ told @ step
-    return np.array(found[::-1])
+    onward = F[: len(covariances) - 1]
+    information = _information(F, weights, left)
+    K, seen = np.split(gains[1:], 2, axis=2)
+    told = weights[1:] + _turned(left[1:]) @ information[1:] @ left[1:]
+    read = seen - _turned(left[1:]) @ information[1:] @ K
+    gained = onward @ (Q / 2.0) @ _turned(onward) + Q / 2.0
+    noise = _summed(told @ gained @ _turned(told) + read @ _turned(read), onward, left)
+    rest = np.eye(len(Q)) - covariances @ information
+    return rest @ covariances @ _turned(rest) + covariances @ noise @ covariances
+
+
+def _information(F: np.ndarray, weights: np.ndarray, left: np.ndarray) -> np.ndarray:
+    """What later samples tell of the error at each, (n, n_x, n_x)."""
+    return _summed(weights[1:], F[: len(weights) - 1], left)
+
+
+def _summed(own: np.ndarray, onward: np.ndarray, left: np.ndarray) -> np.ndarray:
+    """Squares ``own`` (n - 1, n_x, n_x) of samples 1 to n - 1, led back to each sample and summed.
+
+    S[k - 1] = F' (own[k] + L' S[k] L) F, nothing behind the last.
+    """
+    told, ahead = _turned(onward) @ own @ onward, left[1:] @ onward
+    back, found = _turned(ahead), np.zeros(left.shape)
+    for k in range(len(onward) - 1, -1, -1):
+        found[k] = told[k] + back[k] @ found[k + 1] @ ahead[k]
+    return found
+
+
+def _turned(matrices: np.ndarray) -> np.ndarray:
+    """Every matrix transposed."""
+    return matrices.transpose(0, 2, 1)
+
+
+def _times(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Every matrix times its vector, (n, n_x)."""
+    return (matrices @ vectors[:, :, None])[:, :, 0]
 
 
 def consistent_start(plant: Plant, known: Mapping[str, float]) -> np.ndarray:
