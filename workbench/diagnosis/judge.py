@@ -23,11 +23,12 @@ from math import isclose, isnan, log, sqrt
 import numpy as np
 
 from workbench.candidate import Candidate
-from workbench.diagnosis.refit import Refit
+from workbench.diagnosis.refit import Refit, held_out_misfit, surplus
 from workbench.diagnosis.result import Law, Ranked, Size
 from workbench.diagnosis.scan import Profile
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.own_errors import effective_by_output
+from workbench.fitting.problem import Problem
 from workbench.fitting.window_length import moves
 
 LEAST_BIC = 4.0
@@ -36,7 +37,7 @@ MOST_PLAIN = 1.02
 LEAST_SHARE = 0.20
 LEAST_TRAINING = 0.10
 LEAST_SIZE = 0.03
-DISTINCT = 2.0  # posterior standard deviations
+DISTINCT = 2.0  # standard deviations
 FEWEST_WINDOWS = 6  # held out, for recordings of what does not move to refuse anything
 AT_BOUND = 1e-9  # relative: a value scaled and back is off by a rounding
 LARGEST_TIE = 3
@@ -146,7 +147,7 @@ def _reasons_of_size(refit: Refit, candidate: Candidate) -> list[str]:
     return reasons
 
 
-def tie_group(base: Fit, refits: list[Refit], profiles: dict[str, Profile]) -> list[Refit]:
+def tie_group(problem: Problem, refits: list[Refit], profiles: dict[str, Profile]) -> list[Refit]:
     """The leader and those that cannot be told from it, the leader first.
 
     A candidate is tied when its drop comes within a quarter of the best, or within half of it with
@@ -154,13 +155,17 @@ def tie_group(base: Fit, refits: list[Refit], profiles: dict[str, Profile]) -> l
     held-out recording too, unless one leaves several times as much there, or fails to predict it by
     more than a few of its windows.  Among the tied those that pass every criterion come first,
     effects before parameters that would lie far off what is known of them, and among these the one
-    leads that removes most as the mean over training and held-out recordings: either alone orders
+    leads under which training and held-out recordings together are likeliest: either alone orders
     rivals by what its few events happen to show.  But where one leaves at least a fifth less of
-    the held-out misfit, that recording decides.  And where the leader needs more than is usual of
-    one that is always there and leaves hardly less than that one, the other leads.  Those that look
-    most like the leader stand next to it: were it wrong, it would stand for one of them.
+    the held-out misfit, and not in a few windows alone, that recording decides.  And where the
+    leader needs more than is usual of one that is always there and leaves hardly less than that
+    one, the other leads.  Those that look most like the leader stand next to it: were it wrong, it
+    would stand for one of them.
+
+    Source: diagnosis.md 1.6; Vuong 1989, "Likelihood ratio tests for model selection and non-nested
+    hypotheses", for what chance explains.
     """
-    best = refits[0]
+    base, best = problem.base, refits[0]
     tied = [best]
     for other in refits[1:]:
         gap = (best.drop_train - other.drop_train) / max(best.drop_train, 1e-12)
@@ -177,13 +182,28 @@ def tie_group(base: Fit, refits: list[Refit], profiles: dict[str, Profile]) -> l
     tied = tied[: max(len(sound), LARGEST_TIE)]
     effects = [each for each in sound if each.candidate.name in profiles] or sound
     may_lead = [each for each in effects if predicts(each)] or effects
-    best, leader = max(may_lead, key=share_removed), min(may_lead, key=left_held_out)
-    if not clearly_less(left_held_out(leader), left_held_out(best)):
-        leader = best
+    leader = max(may_lead, key=lambda each: _explained(problem, each))
+    best = min(may_lead, key=left_held_out)
+    leader = best if _told_apart_held_out(best, leader) else leader
     leader = next((each for each in may_lead if _leans_on(leader, each)), leader)
     others = [each for each in tied if each is not leader]
     others.sort(key=lambda r: (r not in sound, -abs(_alignment_of(leader, r, profiles))))
     return [leader, *others]
+
+
+def _explained(problem: Problem, each: Refit) -> float:
+    """Squared error, in units of the typical one, that goes away in both recordings together."""
+    held_out = 0.0 if isnan(each.drop_validation) else each.drop_validation
+    return each.drop_train * problem.misfit + held_out * held_out_misfit(problem.base_validation)
+
+
+def _told_apart_held_out(one: Refit, other: Refit) -> bool:
+    """True where one leaves clearly less held out, by more than chance among windows explains."""
+    if one.validation is None or other.validation is None:
+        return False
+    return clearly_less(left_held_out(one), left_held_out(other)) and (
+        surplus(one.validation, other.validation) > DISTINCT
+    )
 
 
 def _refused_by_few(other: Refit, best: Refit) -> bool:

@@ -54,7 +54,7 @@ def with_pairs(
     refits = _refits(problem, profiles, best, progress)
     against = {r.candidate.name: _reasons(problem, r, ranking) for r in refits}
     sound = [each for each in refits if not against[each.candidate.name]]
-    group = tie_group(problem.base, sound, {}) if sound else []
+    group = tie_group(problem, sound, {}) if sound else []
     names = [each.candidate.name for each in group]
     rows = {}
     for each in refits:

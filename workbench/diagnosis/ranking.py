@@ -37,7 +37,7 @@ def ranked(
     recording refuses, then the rest by the scan.  ``begun`` are the shares that first fits removed.
     """
     by_name = {profile.candidate.name: profile for profile in profiles}
-    group = tie_group(problem.base, refits, by_name) if refits else []
+    group = tie_group(problem, refits, by_name) if refits else []
     together = [each.candidate.name for each in group]
     rows = {
         r.candidate.name: refitted_row(problem, r, by_name.get(r.candidate.name)) for r in refits

@@ -198,9 +198,21 @@ def held_out_drop(before: Fit | None, after: Fit | None) -> float:
     """
     if before is None or after is None:
         return float("nan")
-    squares = float(np.sum(_bounded(before)))
-    gained = squares - float(np.sum(_bounded(after)))
-    return gained / beyond_noise(squares, before.windows)
+    return float(np.sum(_bounded(before)) - np.sum(_bounded(after))) / held_out_misfit(before)
+
+
+def held_out_misfit(fit: Fit | None) -> float:
+    """Squared error beyond noise of what is held out, no window counted too much; 0 without any."""
+    return beyond_noise(float(np.sum(_bounded(fit))), fit.windows) if fit else 0.0
+
+
+def surplus(one: Fit, other: Fit) -> float:
+    """What another fit misses more of the held-out windows, in standard deviations by chance.
+
+    Windows are a sample of what may be recorded: sum d / sqrt(n var d), with d their differences.
+    """
+    more = np.sum(_bounded(other) - _bounded(one), axis=0)
+    return float(np.sum(more) / max(np.sqrt(len(more)) * np.std(more), 1e-300))
 
 
 def _bounded(fit: Fit) -> np.ndarray:
