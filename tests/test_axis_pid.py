@@ -23,7 +23,11 @@ from workbench.plants.crr_rig import crr_rig
 from workbench.plants.servo_drive import servo_drive
 
 
-@pytest.mark.parametrize("plant", [crr_arm(), servo_drive()], ids=lambda plant: plant.name)
+@pytest.mark.parametrize(
+    "plant",
+    [pytest.param(crr_arm(), marks=pytest.mark.slow), servo_drive()],
+    ids=lambda plant: plant.name,
+)
 def test_the_bandwidth_that_a_refusal_names_is_one_that_all_modes_allow(plant):
     """It had been that of the first mode, rounded upwards, and was refused itself."""
     asked = {"phase_margin_rad": 0.7, "overshoot": 0.3}
