@@ -18,6 +18,7 @@ A pair pays for the parameters of both, takes twice the share, and both sizes mu
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from math import isclose, isnan, log, sqrt
 
 import numpy as np
@@ -165,9 +166,23 @@ def tie_group(problem: Problem, refits: list[Refit], profiles: dict[str, Profile
     Source: diagnosis.md 1.6; Vuong 1989, "Likelihood ratio tests for model selection and non-nested
     hypotheses", for what chance explains.
     """
-    base, best = problem.base, refits[0]
+    tied = _close(refits, profiles)
+    against = {id(each): bool(reasons_against(problem.base, each)) for each in tied}
+    tied.sort(key=lambda each: against[id(each)])
+    sound = [each for each in tied if not against[id(each)]] or tied[:LARGEST_TIE]
+    tied = tied[: max(len(sound), LARGEST_TIE)]
+    effects = [each for each in sound if each.candidate.name in profiles] or sound
+    leader = _leader(problem, effects)
+    others = [each for each in tied if each is not leader]
+    others.sort(key=lambda r: (r not in sound, -abs(_alignment_of(leader, r, profiles))))
+    return [leader, *others]
+
+
+def _close(refits: Sequence[Refit], profiles: Mapping[str, Profile]) -> list[Refit]:
+    """The best in training, which is the first, and those that cannot be told from it."""
+    best, *others = refits
     tied = [best]
-    for other in refits[1:]:
+    for other in others:
         gap = (best.drop_train - other.drop_train) / max(best.drop_train, 1e-12)
         same = abs(_alignment_of(best, other, profiles)) > SAME_DIRECTION
         told_apart = predicts(best) and not predicts(other)
@@ -177,18 +192,16 @@ def tie_group(problem: Problem, refits: list[Refit], profiles: dict[str, Profile
             continue
         if gap < (CLOSE_DROP_SAME if same else CLOSE_DROP):
             tied.append(other)
-    tied.sort(key=lambda each: bool(reasons_against(base, each)))
-    sound = [each for each in tied if not reasons_against(base, each)] or tied[:LARGEST_TIE]
-    tied = tied[: max(len(sound), LARGEST_TIE)]
-    effects = [each for each in sound if each.candidate.name in profiles] or sound
+    return tied
+
+
+def _leader(problem: Problem, effects: Sequence[Refit]) -> Refit:
+    """Which of the tied leads; see :func:`tie_group`."""
     may_lead = [each for each in effects if predicts(each)] or effects
     leader = max(may_lead, key=lambda each: _explained(problem, each))
-    best = min(may_lead, key=left_held_out)
-    leader = best if _told_apart_held_out(best, leader) else leader
-    leader = next((each for each in may_lead if _leans_on(leader, each)), leader)
-    others = [each for each in tied if each is not leader]
-    others.sort(key=lambda r: (r not in sound, -abs(_alignment_of(leader, r, profiles))))
-    return [leader, *others]
+    closest = min(may_lead, key=left_held_out)
+    leader = closest if _told_apart_held_out(closest, leader) else leader
+    return next((each for each in may_lead if _leans_on(leader, each)), leader)
 
 
 def _explained(problem: Problem, each: Refit) -> float:
@@ -243,7 +256,7 @@ def left_held_out(each: Refit | Ranked) -> float:
     return 1.0 if isnan(each.drop_validation) else max(1.0 - each.drop_validation, 0.01)
 
 
-def _alignment_of(one: Refit, other: Refit, profiles: dict[str, Profile]) -> float:
+def _alignment_of(one: Refit, other: Refit, profiles: Mapping[str, Profile]) -> float:
     """Cosine between two refitted candidates; 0 where one has no profile (a shift)."""
     a, b = profiles.get(one.candidate.name), profiles.get(other.candidate.name)
     return alignment(a, b) if a and b else 0.0
