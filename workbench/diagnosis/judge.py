@@ -214,9 +214,8 @@ def _told_apart_held_out(one: Refit, other: Refit) -> bool:
     """True where one leaves clearly less held out, by more than chance among windows explains."""
     if one.validation is None or other.validation is None:
         return False
-    return clearly_less(left_held_out(one), left_held_out(other)) and (
-        surplus(one.validation, other.validation) > DISTINCT
-    )
+    clearly = clearly_less(left_held_out(one), left_held_out(other))
+    return clearly and surplus(one.validation, other.validation) > DISTINCT
 
 
 def _refused_by_few(other: Refit, best: Refit) -> bool:
