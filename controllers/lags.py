@@ -36,11 +36,10 @@ SPOOL, SENSOR = "spool", "sensor"
 
 @dataclass(frozen=True)
 class Lag:
-    """A first-order lag through which a share of what enters goes."""
+    """A first-order lag through which all goes that enters."""
 
     name: str
     time_constant_s: float
-    share: float = 1.0
 
 
 def lags_of(plant: Plant, law: Controller) -> tuple[Lag, ...]:
@@ -53,7 +52,7 @@ def lags_of(plant: Plant, law: Controller) -> tuple[Lag, ...]:
 def measured_lags(plant: Plant, signal: str) -> tuple[Lag, ...]:
     """Those of a law on one measured signal as it arrives."""
     sensors = (
-        Lag(SENSOR, float(e.time_constant_s), float(e.lagged_share))
+        Lag(SENSOR, float(e.time_constant_s))
         for e in plant.effects
         if isinstance(e, SensorLag) and e.signal == signal and not e.absent
     )
@@ -89,19 +88,19 @@ def unread(law: Law, more: int = 1) -> Law:
 
 def _behind(mode: Mode, lag: Lag) -> Mode:
     """The mode of one more state: its first command goes through the lag."""
-    n, s = len(mode.state_names), lag.share
+    n = len(mode.state_names)
     A, B = np.pad(mode.A, (0, 1)), np.pad(mode.B, ((0, 1), (0, 0)))
-    A[:n, n], A[n, n] = s * mode.B[:, 0], -1.0 / lag.time_constant_s
-    B[:n, 0] *= 1.0 - s
+    A[:n, n], A[n, n] = mode.B[:, 0], -1.0 / lag.time_constant_s
+    B[:n, 0] = 0.0
     B[n, 0] = 1.0 / lag.time_constant_s
     D = mode.D.copy()
-    D[:, 0] *= 1.0 - s
+    D[:, 0] = 0.0
     return replace(
         mode,
         state_names=(*mode.state_names, f"{lag.name}.lagged"),
         A=A,
         B=B,
-        C=np.column_stack([mode.C, s * mode.D[:, 0]]),
+        C=np.column_stack([mode.C, mode.D[:, 0]]),
         D=D,
         state=np.append(mode.state, mode.command[0]),
         drift=np.append(mode.drift, 0.0),

@@ -84,27 +84,14 @@ def test_a_spool_is_led_where_an_estimator_tells_of_it_and_only_there(slow):
     assert spool_lag(fast, told=True) == (Lag("spool", 2e-3),)
 
 
-def test_half_of_a_reading_through_a_lag_is_that_of_python_control(hybrid, mode):
-    """Behind the position, where it stands, another package has the same loop."""
-    half = Lag("sensor", 20e-3, 0.5)
-    lagging = driven_modes(behind_lags(hybrid, [half]))[0][1]
-    A, B, C = loop(lagging, unread(proportional(30.0)), DT)
-    sensor = control.parallel(control.ss(-50.0, 50.0, 0.5, 0.0), control.ss([], [], [], 0.5))
-    place = control.ss(mode.A, mode.B, np.eye(4)[:1], 0.0)
-    whole = control.c2d(control.series(place, sensor), DT, "zoh")
-    z = np.exp(1j * DT * np.geomspace(1.0, 3000.0, 40))
-
-    assert control.ss(A, B, C, 0.0, DT)(z) == pytest.approx(30.0 * whole(z), rel=1e-6)
-
-
 def test_the_lag_of_a_sensor_is_in_the_loop_of_a_law_on_that_sensor_alone(slow):
     """Estimators know it: an LQ behind one does not meet it, nor a PID that of a pressure."""
     place, pressure = "slide.position", "chamber_a.pressure"
-    values = {f"sensor_lag@{place}.lagged_share": 0.5, f"sensor_lag@{pressure}.lagged_share": 1.0}
-    both = slow.with_values({**values, f"sensor_lag@{place}.time_constant_s": 20e-3})
+    late_s = {place: 20e-3, pressure: 10e-3}
+    both = slow.with_values({f"sensor_lag@{k}.time_constant_s": v for k, v in late_s.items()})
     pid, lq = (design(method, both).controller for method in ("axis-pid", "lq"))
 
-    assert lags_of(both, pid) == (SLOW, Lag("sensor", 20e-3, 0.5))
+    assert lags_of(both, pid) == (SLOW, Lag("sensor", 20e-3))
     assert lags_of(both, lq) == (Lag("spool", LED_S),)
 
 

@@ -205,9 +205,7 @@ def test_the_soft_joint_keeps_its_energy_while_its_wall_gives_way():
 
 def test_a_sensor_that_lags_follows_with_its_time_constant():
     name = "sensor_lag@reservoir.pressure"
-    plant = PLANTS["servo_reservoir"]().with_values(
-        {f"{name}.lagged_share": 1.0, f"{name}.time_constant_s": 0.05}
-    )
+    plant = PLANTS["servo_reservoir"]().with_values({f"{name}.time_constant_s": 0.05})
     plant = plant.lean()
     result = simulate(plant, Recording("fill", DT, {VOLTS: np.full(1000, 6.0)}))
     true, read = run(tank(), np.full(1000, 6.0), VOLTS)[TANK], result[f"{name}.lagged"] * 1e5
@@ -238,7 +236,7 @@ def test_a_spool_lag_on_a_pwm_command_is_first_order():
 
 def test_a_design_does_without_play_and_sensor_lag_even_before_a_spool_lag():
     values = {
-        "sensor_lag@chamber_a.pressure.lagged_share": 1.0,
+        "sensor_lag@chamber_a.pressure.time_constant_s": 10e-3,
         "valve_hysteresis.play_share": 0.02,
     }
     flawed = PLANTS["servo_drive"]().with_values(values | {"valve_lag.time_constant_s": 0.01})

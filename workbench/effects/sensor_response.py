@@ -18,6 +18,7 @@ from workbench.effect import (
     form,
     strength,
 )
+from workbench.effects.fading_lag import behind_lag, lagged_rate
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,9 +45,11 @@ class SensorScale(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class SensorLag(Effect):
-    """A share of the reading comes through a first-order lag.
+    """The reading comes through a first-order lag, whole but for the shortest ones.
 
-    y = y_true + share (z - y_true),   T dz/dt = y_true - z
+    y = y_true + g (z - y_true), see :mod:`workbench.effects.fading_lag`.  A share that is fitted
+    beside the time would be no sensor: a twelfth of a position that comes 70 ms late imitates a
+    valve that lets too much through.
 
     The lagged value is counted in ``unit``, a typical size of the signal, so that one effect serves
     positions and pressures.
@@ -57,9 +60,7 @@ class SensorLag(Effect):
     causes = (
         Cause(
             name="sensor_lag",
-            strength="lagged_share",
-            forms=("time_constant_s",),
-            shapes={"time_constant_s": (3e-3, 30e-3)},
+            strength="time_constant_s",
             balance=Balance.SENSOR,
             drivers=("rate of the measured value",),
             shown_by="fast command steps",
@@ -71,8 +72,8 @@ class SensorLag(Effect):
     unit: float
     initial: float = 0.0
 
-    lagged_share: Expression = strength(typical=1.0, upper=1.0)
-    time_constant_s: Expression = form(10e-3, lower=5e-4, upper=0.5)
+    time_constant_s: Expression = strength(typical=10e-3, upper=0.5)
+    shortest_s: Expression = form(0.5e-3, lower=1e-4, upper=1e-2)
 
     def states(self) -> Iterator[State]:
         yield State("lagged", initial=self.initial / self.unit, scale=1.0)
@@ -83,8 +84,9 @@ class SensorLag(Effect):
     def alter(self, signal: str, value: Expression, now: Conditions) -> Expression:
         if signal != self.signal:
             return value
-        return value + self.lagged_share * (now[self.name].lagged * self.unit - value)
+        lagged = now[self.name].lagged * self.unit
+        return behind_lag(value, lagged, self.time_constant_s, self.shortest_s)
 
     def rates(self, now: Conditions, received: Received) -> dict[str, Expression]:
-        true = now.read(self.signal) / self.unit
-        return {"lagged": (true - now[self.name].lagged) / self.time_constant_s}
+        true, lagged = now.read(self.signal) / self.unit, now[self.name].lagged
+        return {"lagged": lagged_rate(true, lagged, self.time_constant_s, self.shortest_s)}

@@ -20,6 +20,7 @@ from workbench.effect import (
     form,
     strength,
 )
+from workbench.effects.fading_lag import behind_lag, lagged_rate
 from workbench.effects.timing import Timing
 from workbench.spool import shut_while_stuck
 
@@ -55,14 +56,8 @@ class ValveOffset(Effect):
 class ValveLag(Effect):
     """First-order lag of the spool: u -> lagged u, T d(lagged)/dt = u - lagged.
 
-    The strength is the time constant itself.  A lag with time constant zero is singular, so the
-    lagged state never gets faster than ``shortest_s`` and is mixed in by a share that vanishes at
-    the null:
-
-    T_e dz/dt = u - z,   T_e = T + shortest exp(-T / shortest)
-    out = u + g (z - u),   g = 1 - exp(-T / shortest)
-
-    For T well above the shortest time this is the plain lag; at T = 0 it passes u unchanged.
+    The strength is the time constant itself; see :mod:`workbench.effects.fading_lag` for short
+    ones.
 
     Source: paper 002 (100 Hz, neglected); physics.md section 6 (valve_dynamics); share form of
     architecture.md section 4.
@@ -96,13 +91,13 @@ class ValveLag(Effect):
         if signal != self.signal:
             return value
         now.place(f"{self.name}.entering_v", value)
-        share = 1.0 - ca.exp(-self.time_constant_s / self.shortest_s)
-        return value + share * (now.read(f"{self.name}.{self.lagged}") - value)
+        lagged = now.read(f"{self.name}.{self.lagged}")
+        return behind_lag(value, lagged, self.time_constant_s, self.shortest_s)
 
     def rates(self, now: Conditions, received: Received) -> dict[str, Expression]:
-        shortest_s, lagged = self.shortest_s, now.read(f"{self.name}.{self.lagged}")
-        effective_s = self.time_constant_s + shortest_s * ca.exp(-self.time_constant_s / shortest_s)
-        return {self.lagged: (now[self.name].entering_v - lagged) / effective_s}
+        entering, lagged = now[self.name].entering_v, now.read(f"{self.name}.{self.lagged}")
+        rate = lagged_rate(entering, lagged, self.time_constant_s, self.shortest_s)
+        return {self.lagged: rate}
 
 
 @dataclass(frozen=True, kw_only=True)
