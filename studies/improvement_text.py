@@ -15,6 +15,7 @@ from workbench.diagnosis.result import told
 if TYPE_CHECKING:
     from workbench.diagnosis.improvement import Improvement, Stage
     from workbench.diagnosis.passes import Removal, Swap
+    from workbench.diagnosis.result import Diagnosis
     from workbench.fitting.errors import Errors
 
 CAME, REFITTED, END = (Change.START.value, "refitted", "in the end")
@@ -33,7 +34,7 @@ def improvement_text(found: Improvement, unit_of: Mapping[str, str]) -> str:
     ]
     parts = [columns(head, rows), ""]
     for k, diagnosis in enumerate(found.diagnoses, start=1):
-        parts += [f"diagnosis {k}: {diagnosis.sentence}"]
+        parts += [f"diagnosis {k}: {diagnosis.sentence}{_taken_instead(diagnosis)}"]
         parts += [each.sentence for each in found.ahead if each.after == k]
     parts += [f"warning: {warning}" for warning in found.warnings]
     parts += thoughts_text(found)
@@ -48,6 +49,14 @@ def improvement_text(found: Improvement, unit_of: Mapping[str, str]) -> str:
             parts += ["", FREE_RUNS, free]
         parts += ["", moved_text(found.parameters)]
     return "\n".join(parts)
+
+
+def _taken_instead(found: Diagnosis) -> str:
+    """What came in although a law explains more: an effect of the catalogue is asked first."""
+    best = next(iter(found.ranking), None)
+    if found.law is None or best is None or not best.accepted:
+        return ""
+    return f"; {best.candidate.name} passes every criterion, and a physical effect comes first"
 
 
 def window_states(found: Improvement) -> dict[str, Errors]:

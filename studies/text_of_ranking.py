@@ -36,7 +36,7 @@ def ranking_text(found: Diagnosis) -> str:
             percent(row.compensable),
             sizes_text(row),
             row.decided_by.value,
-            _remark(row),
+            _remark(row, found.ranking[0]),
         )
         for place, row in enumerate(found.ranking[:SHOWN_RANKS], start=1)
     ]
@@ -52,9 +52,14 @@ def sizes_text(row: Ranked) -> str:
     return ", ".join(sizes) or "-"
 
 
-def _remark(row: Ranked) -> str:
+def _remark(row: Ranked, leader: Ranked) -> str:
+    """What speaks for or against a candidate; passing alone makes it no second cause."""
+    if row.accepted and row.tied_with:
+        return f"accepted, tied with {', '.join(row.tied_with)}"
+    if row.accepted and row is not leader and row.candidate.name not in leader.crowd:
+        return f"would pass, but {leader.candidate.name} explains more"
     if row.accepted:
-        return f"accepted, tied with {', '.join(row.tied_with)}" if row.tied_with else "accepted"
+        return "accepted"
     return "; ".join((*reasons(row), *([_blind_text(row)] if row.blind else [])))
 
 

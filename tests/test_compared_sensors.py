@@ -9,6 +9,7 @@ from test_comparison import NOISE, PRESSURE, measured
 from workbench.comparison import compare
 from workbench.comparison.compare import FREE_RUN, ONE_STEP, WINDOW
 from workbench.consistency import examined
+from workbench.consistency.findings import Weight
 from workbench.reading import RecordingWarning
 from workbench.rig import default_rig
 
@@ -41,3 +42,24 @@ def test_a_slow_sensor_on_a_fast_clock_is_looked_at_without_a_word(drive):
     slow = replace(recording, channels={**recording.channels, PRESSURE: pressure_pa})
 
     assert examined(drive, slow) == ()
+
+
+def test_time_in_which_nothing_was_recorded_is_told_and_belongs_to_no_regime(drive):
+    """Behind the last sample the guessed plant rests: it was told as at rest, 90 % of a time."""
+    recording = measured(drive)
+    n, outputs = len(recording), drive.plant.measured
+    more = {k: np.full(n, np.nan if k in outputs else v[-1]) for k, v in recording.channels.items()}
+    both = {k: np.concatenate([v, more[k]]) for k, v in recording.channels.items()}
+    silent = replace(recording, channels=both)
+
+    with pytest.warns(RecordingWarning, match="has no samples for 50% of the recording"):
+        found = compare(drive, [silent]).recordings[0]
+
+    (whole,) = compare(drive, [recording]).recordings
+    told, shares = (
+        {each.name: each.share_of_time for each in one.by_regime} for one in (whole, found)
+    )
+    for name in ("at rest", "moving forward", "valve closed", "valve open above 4.95 V"):
+        assert shares[name] == pytest.approx(told[name], abs=0.01)
+    assert {each.weight for each in examined(drive, silent)} == {Weight.NOTICE}
+    assert examined(drive, recording) == ()

@@ -83,3 +83,25 @@ def test_a_reader_that_has_enough_ends_a_command_without_a_word():
     assert command.stderr.read() == b""
     assert command.wait() == 141
     command.stderr.close()
+
+
+def test_what_ends_a_command_politely_ends_it_as_an_interrupt_does():
+    """``timeout`` ended a long ``improve`` with nothing to show for its finished rounds."""
+    code = """
+import os, signal, sys, time
+import studies.command_line as line
+from studies.command_line.application import answering
+
+@line.app.command("wait")
+def wait():
+    with answering():
+        os.kill(os.getpid(), signal.SIGTERM)
+        time.sleep(20.0)
+
+sys.argv = ["workbench", "wait"]
+line.main()
+"""
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+
+    assert answer.returncode == 130
+    assert "stopped; no file is half-written" in answer.stderr

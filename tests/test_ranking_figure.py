@@ -4,7 +4,7 @@ import csv
 from dataclasses import replace
 
 from matplotlib.colors import to_hex
-from test_report import diagnosis
+from test_report import LAG, diagnosis, ranked
 
 from studies.figures.diagnosis import HOLLOW, diagnosis_figures
 from studies.figures.style import BLUE, save
@@ -53,3 +53,13 @@ def test_an_error_that_falls_below_the_noise_is_all_of_the_misfit_as_in_text_and
     (axes,) = diagnosis_figures(replace(found, ranking=(whole,)))["ranking"].axes
 
     assert [bar.get_width() for bars in axes.containers for bar in bars] == [100.0, 100.0]
+
+
+def test_what_only_would_pass_is_not_bold():
+    found = diagnosis()
+    rows = (*found.ranking, ranked(LAG, 0.2, accepted=True))
+    (axes,) = diagnosis_figures(replace(found, ranking=rows))["ranking"].axes
+
+    assert [label.get_fontweight() for label in axes.get_yticklabels()] == [
+        "bold", "normal", "normal",
+    ]  # fmt: skip

@@ -141,3 +141,23 @@ def test_what_no_state_of_is_measured_stands_beside():
 
     assert "control_chamber.pressure_pa" in found and "floating_piston.position_m" in found
     assert not any(name.startswith(("main_piston", "chamber_")) for name in found)
+
+
+def test_where_no_output_is_received_for_long_nothing_is_watched():
+    """A walk that nobody watches goes on as it likes: that is no missing term."""
+    plant, n, silent, reach = servo_drive().lean(), 100, slice(40, 80), 5
+    channels = {COMMAND: np.full(n, 5.0)} | {
+        name: np.full(n, value) for name, value in zip(OUTPUTS, (0.05, 3e5, 3e5), strict=True)
+    }
+    for name in OUTPUTS:
+        channels[name][silent] = np.nan
+    channels[OUTPUTS[0]][90:] = np.nan  # the pressures are heard there
+    noise = dict(zip(OUTPUTS, (1e-5, 500.0, 500.0), strict=True))
+    recording = Recording("silent", DT_S, channels)
+    known = recording_filter(plant, recording, {VELOCITY: 1.0}, measurement_noise=noise)
+
+    watched = smooth(known, recording).watched(reach)
+
+    expected = np.ones(n, dtype=bool)
+    expected[40 + reach : 80 - reach] = False
+    assert np.array_equal(watched, expected)

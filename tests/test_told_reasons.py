@@ -7,6 +7,7 @@ import pytest
 from test_report import LAG, LEAK, UNITS, diagnosis, ranked
 
 from studies.documents import diagnosis_document
+from studies.improvement_text import _taken_instead
 from studies.text_of_ranking import reasons
 from studies.text_of_results import diagnosis_text, moved_text
 from workbench.diagnosis.judge import HELD_OUT_REASON, SHARE_REASON
@@ -133,3 +134,21 @@ def test_what_is_named_and_does_not_act_where_an_unknown_input_helps_most_is_tol
     assert told in diagnosis_text(replace(found, where=other), UNITS)
     for where in (found.where, alike):
         assert told not in diagnosis_text(replace(found, where=where), UNITS)
+
+
+def test_what_passes_alone_beside_what_explains_more_is_not_told_to_be_missing():
+    """A table in which three effects were ``accepted`` read as if all of them were missing."""
+    found = diagnosis()
+    rows = (*found.ranking, ranked(LAG, 0.2, accepted=True))
+    text = diagnosis_text(replace(found, ranking=rows), UNITS)
+
+    assert text.count("accepted") == 1
+    assert f"would pass, but {LEAK.name} explains more" in text
+
+
+def test_an_effect_that_comes_in_before_a_law_is_told_beside_the_law():
+    law = diagnosis(Verdict.NOT_IN_CATALOGUE, law=object())
+    alone = replace(law, ranking=(ranked(LEAK, 0.1),))
+
+    assert _taken_instead(law).startswith(f"; {LEAK.name} passes every criterion")
+    assert _taken_instead(alone) == _taken_instead(diagnosis()) == ""

@@ -203,18 +203,6 @@ def test_the_soft_joint_keeps_its_energy_while_its_wall_gives_way():
         assert gained == pytest.approx(carried, rel=1e-10, abs=1e-9)
 
 
-def test_a_sensor_that_lags_follows_with_its_time_constant():
-    name = "sensor_lag@reservoir.pressure"
-    plant = PLANTS["servo_reservoir"]().with_values({f"{name}.time_constant_s": 0.05})
-    plant = plant.lean()
-    result = simulate(plant, Recording("fill", DT, {VOLTS: np.full(1000, 6.0)}))
-    true, read = run(tank(), np.full(1000, 6.0), VOLTS)[TANK], result[f"{name}.lagged"] * 1e5
-
-    assert result[TANK][1:] == pytest.approx(read[1:])
-    slope = np.gradient(read, DT)
-    assert (slope * 0.05 + read)[10:-10] == pytest.approx(true[10:-10], rel=2e-3)
-
-
 def test_a_sensor_scale_multiplies_what_is_read_and_not_what_is():
     scaled = tank(**{"sensor_scale@reservoir.pressure__scale_change": 0.05})
     command = np.full(300, 6.0)

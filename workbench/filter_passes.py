@@ -56,6 +56,18 @@ class FilterResult:
     normalised: np.ndarray
     log_likelihood: float
 
+    def watched(self, reach: int) -> np.ndarray:
+        """True where an output was received within so many samples, before or after; (n,)."""
+        received = np.flatnonzero(np.isfinite(self.innovations).any(axis=0))
+        if not len(received):
+            return np.zeros(self.states.shape[1], dtype=bool)
+        samples = np.arange(self.states.shape[1])
+        after = np.searchsorted(received, samples).clip(max=len(received) - 1)
+        nearest = np.minimum(
+            np.abs(received[after] - samples), np.abs(received[np.maximum(after - 1, 0)] - samples)
+        )
+        return nearest <= reach
+
 
 def filter_pass(
     found: PlantFilter, recording: Recording, guessed: np.ndarray | None = None

@@ -4,6 +4,7 @@ Whatever takes time to import is imported inside the commands, so that ``--help`
 """
 
 import os
+import signal
 from typing import Any
 
 from studies.command_line import (
@@ -71,7 +72,10 @@ def main() -> None:
     Matrices here are small: a second thread of BLAS gains nothing on them, and beside the threads
     that simulate it waits for a core, for which products took hundreds of times as long.  Said
     before NumPy is imported, which reads it then; who has set another number keeps it.
+
+    What ends a command politely, as ``timeout`` and job queues do, ends it as Ctrl-C does.
     """
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     app()
 

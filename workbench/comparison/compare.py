@@ -47,7 +47,7 @@ LEAST_SHARE = 0.01  # of the squared error: a window with less is not marked
 
 @dataclass(frozen=True)
 class Regime:
-    """One regime: its share of the squared error, and of the time."""
+    """One regime: its share of the squared error, and of the time that outputs were recorded."""
 
     name: str
     share_of_error: float
@@ -198,8 +198,9 @@ def _first_of(wanted: Sequence[str], simulated: Mapping[str, Rows]) -> str:
 
 def _by_regime(course: Course, squared: np.ndarray) -> tuple[Regime, ...]:
     chosen = regimes_of(course)
+    seen = np.isfinite(course.recording.rows(course.plant.measured)).any(axis=0)
     return tuple(
-        Regime(name, share, float(np.mean(chosen[name])))
+        Regime(name, share, float(np.mean(chosen[name][seen])))
         for name, share in shares(chosen, squared).items()
     )
 

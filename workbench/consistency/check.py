@@ -22,7 +22,7 @@ import numpy as np
 from workbench.consistency.explained import Probe, moving, probe, unexplained
 from workbench.consistency.findings import Finding, Weight
 from workbench.consistency.misreadings import Misreading, misreadings
-from workbench.consistency.sensors import beyond_stops, noisy, stuck, uneven_clock
+from workbench.consistency.sensors import beyond_stops, missing, noisy, stuck, uneven_clock
 from workbench.errors import InputError
 from workbench.fitting.problem import staged
 from workbench.fitting.window_length import moves as has_motion
@@ -97,7 +97,9 @@ def _examined(rig: Rig, recording: Recording) -> tuple[Recording, list[Finding]]
     whole = rig.fit_for(recording)
     added = rig.added_to(whole)
     plant = staged(whole, *(candidate.member for candidate in added))
+    silent = missing(plant, recording)
     recording, findings = stuck(plant, recording)
+    findings += silent
     where = probe(plant, recording)
     if where is None:
         return recording, findings

@@ -5,6 +5,7 @@ Noise      A signal with any motion in it is smoother than white noise: the thir
 Stuck      Equal to the last bit for a while, in a channel that otherwise changes from sample to
            sample, while the plant says that it moves.
 Saturated  At an end of what it can show, to the last bit, again and again.
+Missing    Silent for a while, many times longer than between its other samples.
 Stops      No body gets through them.
 Clock      A sample taken delta late reads y + delta dy/dt: noise that grows with the slope, by the
            same delta in every channel that is fine enough to show it.
@@ -30,6 +31,8 @@ from workbench.units import display_unit, public_name, scale
 WHITE = 0.8  # of a channel's standard deviation is that of white noise
 OUTSIDE = 0.2  # of the stroke: a position that far beyond a stop cannot be
 LEAST_STUCK = 0.02  # of a recording
+SILENT = 20  # times as long as usual without a sample, and at least so many samples
+WORTH_A_WORD = 0.1  # of a recording, missing in such stretches
 LOOKED_AT = 8  # windows of a stretch in which a sensor may be stuck
 UNEVEN = 0.1  # of a sample: a clock that ticks as unevenly as that is worth a word
 CLEARLY = 10.0  # noise deviations: a motion that a sensor cannot miss
@@ -134,6 +137,37 @@ def _without_saturated(plant: Plant, recording: Recording) -> tuple[Recording, l
             remedy = "left out of errors, fits and noise; a sensor of a wider range would tell them"
             found.append(_finding(Weight.DOUBT, recording, name, what, remedy))
     return replace(recording, channels=channels) if found else recording, found
+
+
+def missing(plant: Plant, recording: Recording) -> list[Finding]:
+    """A word on outputs that are silent for a tenth of the recording: nothing is told of then."""
+    found = []
+    for name in plant.measured:
+        gaps = _silences(np.isfinite(recording[name]))
+        share = sum(length for _, length in gaps) / len(recording)
+        if share < WORTH_A_WORD:
+            continue
+        first, length = max(gaps, key=lambda each: each[1])
+        begin_s, end_s = (recording.sample_time_s * k for k in (first, first + length))
+        what = (
+            f"has no samples for {share:.0%} of the recording, the longest time from "
+            f"{begin_s:.4g} to {end_s:.4g} s"
+        )
+        remedy = "nothing is told of these times; check the sensor"
+        found.append(_finding(Weight.NOTICE, recording, name, what, remedy))
+    return found
+
+
+def _silences(recorded: np.ndarray) -> list[tuple[int, int]]:
+    """First sample and length of the stretches in which a channel is silent for long."""
+    heard = np.flatnonzero(recorded)
+    if not len(heard):
+        return [(0, len(recorded))]
+    usual = float(np.median(np.diff(heard))) if len(heard) > 1 else 1.0
+    edges = np.concatenate([[-1], heard, [len(recorded)]])
+    lengths = np.diff(edges) - 1
+    long = lengths >= SILENT * usual
+    return list(zip((edges[:-1][long] + 1).tolist(), lengths[long].tolist(), strict=True))
 
 
 def _should_move(plant: Plant, recording: Recording, name: str, stretch: tuple[int, int]) -> bool:

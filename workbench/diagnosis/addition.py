@@ -17,7 +17,7 @@ from workbench.diagnosis.refit import Refit, refit, refit_shaken
 from workbench.diagnosis.result import Diagnosis, Evidence, Law, Ranked, told
 from workbench.diagnosis.rough import rough_fit
 from workbench.diagnosis.scan import scan, scan_catalogue
-from workbench.diagnosis.settle import settled
+from workbench.diagnosis.settle import settled_leader
 from workbench.diagnosis.where import locate
 from workbench.fitting.errors import Errors, errors_of
 from workbench.fitting.gauss_newton import Fit
@@ -93,7 +93,7 @@ def add(
 
 def refitted_addition(rig: Rig, problem: Problem, found: Refit, evidence: Evidence) -> Addition:
     """A refit as an addition to the rig of its problem, with its size settled."""
-    fit = settled(found.fit, found.candidate)
+    fit = settled_leader(found.fit, found.candidate)
     before = errors_of(problem.base, problem.base_validation)
     drops = (found.drop_train, found.drop_validation)
     return addition(rig, before, found.candidate, fit, problem.validated(fit), drops, evidence)

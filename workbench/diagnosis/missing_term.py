@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -73,3 +73,9 @@ class Course:
     states: np.ndarray = field(repr=False)
     commands: np.ndarray = field(repr=False)
     measured: np.ndarray = field(repr=False)
+
+    def part(self, kept: np.ndarray) -> Course:
+        """Some of the samples, (n,) of truths."""
+        rows = (self.states, self.commands, self.measured)
+        states, commands, measured = (each[:, kept] for each in rows)
+        return replace(self, states=states, commands=commands, measured=measured)

@@ -15,7 +15,7 @@ from itertools import combinations
 
 import numpy as np
 
-from workbench.diagnosis.judge import effective_samples
+from workbench.diagnosis.judge import LARGEST_TIE, SHARE_REASON, effective_samples
 from workbench.diagnosis.manoeuvre_choice import (
     FIRST_WINDOWS,
     WINDOWS,
@@ -45,8 +45,9 @@ def recommended(
 ) -> NextRecording | None:
     """What to record next where a verdict leaves a question open; None where it does not.
 
-    A tie asks to be broken; a proxy, or a verdict on one recording alone, to be told from the
-    model as it is; and a recording that shows too little for one that shows more.
+    A tie asks to be broken, and a proxy to be told from others that explain as little; without any,
+    as with a verdict on one recording alone, it is to be told from the model as it is.  A recording
+    that shows too little asks for one that shows more.
     """
     leader = ranking[0] if ranking else None
     if verdict not in ASKING or leader is None:
@@ -58,6 +59,9 @@ def recommended(
         return None
     progress("next recording")
     alike = (*leader.tied_with, *leader.crowd)
+    if verdict is Verdict.SMALL_PROXY:
+        alike = (*alike, *(r.candidate.name for r in ranking[1:] if r.reasons == (SHARE_REASON,)))
+        alike = alike[: LARGEST_TIE - 1]
     tied = {r.candidate.name: r.fit for r in ranking if r.candidate.name in alike}
     others = {name: fit for name, fit in tied.items() if fit} or {NOTHING: problem.base}
     rivals = {leader.candidate.name: leader.fit, **others}

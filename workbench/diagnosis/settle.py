@@ -17,8 +17,10 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from workbench.candidate import Candidate
+from workbench.diagnosis.judge import MOST_PLAIN
 from workbench.diagnosis.refit import ITERATIONS, sizes
 from workbench.diagnosis.result import Ranked, Size
+from workbench.fitting.errors import plain_ratio
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.own_errors import weighed_anew
 from workbench.fitting.problem import Problem
@@ -53,13 +55,24 @@ def settled(fit: Fit, candidate: Candidate) -> Fit:
     return fit
 
 
+def settled_leader(fit: Fit, candidate: Candidate) -> Fit:
+    """:func:`settled`, and its size looked for beside it too."""
+    strengths = tuple(each.strength for each in candidate.singles)
+    return resized(settled(fit, candidate), strengths, ITERATIONS)
+
+
 def _settled_row(problem: Problem, row: Ranked, leads: bool) -> Ranked:
-    fit = settled(row.fit, row.candidate)
-    if leads:
-        strengths = tuple(each.strength for each in row.candidate.singles)
-        fit = resized(fit, strengths, ITERATIONS)
-    size = sizes(fit, tuple(row.size))
-    return replace(row, fit=fit, validation=problem.validated(fit), size=size)
+    """The row with its size settled; as it was where held-out recordings are predicted worse so.
+
+    What was accepted for predicting better than the base is not to be told with a fit that does
+    not.
+    """
+    fit = (settled_leader if leads else settled)(row.fit, row.candidate)
+    validation = problem.validated(fit)
+    plain = plain_ratio(problem.base_validation, validation)
+    if plain > MOST_PLAIN and plain > row.plain_validation:
+        return row
+    return replace(row, fit=fit, validation=validation, size=sizes(fit, tuple(row.size)))
 
 
 def _steady(before: Mapping[str, Size], now: Mapping[str, Size]) -> bool:

@@ -4,7 +4,8 @@ A random walk is added to one balance at a time, at *prior* parameters: a determ
 spread a valve or leak error into mass and damping and move the blame (diagnosis.md 4.3).  The gain
 of log-likelihood over the filter without it, at the best of a few intensities, names the balance;
 the smoothed walk, in N or kg/s, against the variables that drive it shows what is missing
-(:mod:`workbench.diagnosis.dependence`).
+(:mod:`workbench.diagnosis.dependence`).  Where no sensor was heard for a while the walk goes on as
+it likes: that is told of nowhere.
 
 Heat enters a pressure as a flow of gas does, and only the mass tells them apart, which nobody
 measures: the energy balance of a gas is named where it gains clearly more than its mass balance.
@@ -43,6 +44,7 @@ from workbench.simulation import inputs
 
 GRID_S = 5e-3  # of the filter
 LONGEST = 2000  # steps of the filter where nothing does
+UNHEARD = 20  # steps of the filter without any output, on either side: there nothing is known
 CLEARLY_MORE = 1.05  # times the gain of the mass balance
 INTO_GAS = (Balance.VALVE, Balance.FLOW, Balance.MASS, Balance.ENERGY, Balance.SUPPLY)
 
@@ -73,20 +75,23 @@ def locate(problem: Problem, recordings: Sequence[Recording]) -> Where | None:
     neighbour = _neighbour(gains[worst], likeliest)
     filters = lacking({worst.parameter: likeliest})
     result, other = (smooth(filters, recording, q / likeliest) for q in (likeliest, neighbour))
-    term, course = result.unknown[0], _course(plant, recording, result, decimate, worst)
+    heard = result.watched(UNHEARD)
+    term, softer = (each.unknown[0, heard] for each in (result, other))
+    time_s, course = result.time_s[heard], _course(plant, recording, result, decimate, worst)
+    course = course.part(heard)
     columns = parameter_columns(plant, problem.base.unknowns, course)
-    rest, rest_other = (d - imitated(d, columns) for d in (term, other.unknown[0]))
-    followed = drivers(plant, course, result.time_s)
+    rest, rest_other = (d - imitated(d, columns) for d in (term, softer))
+    followed = drivers(plant, course, time_s)
     return Where(
         balance=worst.balance,
         by_balance={s.balance: max(0.0, *by.values()) for s, by in gains.items()},
         term_name=worst.term,
-        time_s=result.time_s,
+        time_s=time_s,
         term=term,
-        term_deviation=result.unknown_deviation[0],
+        term_deviation=result.unknown_deviation[0, heard],
         against=dependences(followed, _directions(plant, worst, followed), rest, rest_other),
         by_regime=regime_shares(problem.base),
-        intensities=Intensities(likeliest, neighbour, other.unknown[0]),
+        intensities=Intensities(likeliest, neighbour, softer),
         imitated=max(1.0 - float(rest.var() / term.var()), 0.0) if term.any() else 0.0,
         rest=rest,
         course=course,

@@ -25,7 +25,7 @@ class ChamberLeak(Effect):
             strength="area_m2",
             balance=Balance.MASS,
             drivers=("chamber pressure",),
-            shown_by="fill, close the valve, log the pressure for 20 s",
+            shown_by="fill slowly (gas at room temperature), close, log the pressure for minutes",
             source="papers 002 Fig. 15, 004; physics.md section 6 (leak_ambient)",
         ),
     )
