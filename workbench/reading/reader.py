@@ -171,7 +171,8 @@ def _in_si(rig: Rig, table: Table, raw: dict[str, np.ndarray]) -> dict[str, np.n
             said = cannot_be(name, values, found[name], unit, plant, table.file)
         if said is None and name in plant.measured and np.nanmin(values) == np.nanmax(values):
             seen = values[np.isfinite(values)]
-            what = f"is {seen[0]:.6g} {unit} in all {len(seen)} samples".replace("  ", " ")
+            times = f"all {len(seen)} samples" if len(seen) > 1 else "its one sample"
+            what = f"is {seen[0]:.6g} {unit} in {times}".replace("  ", " ")
             said = Message(what, public_name(name), "a sensor that moves", file=table.file)
         wrong += [said] if said else []
     if wrong:
