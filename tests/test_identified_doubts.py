@@ -52,6 +52,17 @@ def test_a_value_is_doubted_beyond_five_prior_deviations(off, warned):
     assert not doubts(PROCEDURES["dead-volume"], found) or "--tank" in text
 
 
+def test_a_weak_strength_is_not_believed_to_a_part_of_what_is_negligible():
+    """A friction that is the same both ways lay 20 deviations off an asymmetry of 4 %."""
+    name, friction = "friction.asymmetry", PROCEDURES["friction"]
+
+    assert not doubts(friction, identified(name, 0.0))
+    assert doubts(friction, identified(name, 0.15))
+    stated = identified(name, 0.0)
+    stated = replace(stated, rig=replace(stated.rig, deviations={name: 2e-3}))
+    assert doubts(friction, stated)
+
+
 def test_a_value_at_a_bound_is_marked_as_no_result():
     found = identified(RATIO, 0.05, "servo_reservoir")
     said = identified_text(PROCEDURES["flow"], found)
