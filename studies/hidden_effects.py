@@ -14,6 +14,7 @@ from studies.hidden_benches import bench_of
 from studies.truth.case import Case
 from workbench.diagnosis.diagnose import diagnose
 from workbench.diagnosis.result import Diagnosis, Verdict
+from workbench.fitting.windows import MOST_WINDOWS
 from workbench.recording import Recording
 from workbench.rig import Rig
 
@@ -80,9 +81,16 @@ def recordings(cases: Iterable[Case]) -> list[Recorded]:
     return [bench.recorded(str(case.hidden), two) for case, two in zip(cases, tables, strict=True)]
 
 
-def answer(case: Case, train: Recording, validation: Recording, rig: Rig | None = None) -> Answer:
+def answer(
+    case: Case,
+    train: Recording,
+    validation: Recording,
+    rig: Rig | None = None,
+    most_windows: int = MOST_WINDOWS,
+) -> Answer:
     """Diagnose one case, with the rig of its user or another one."""
-    diagnosis = diagnose(rig or bench_of(case).user_rig(case), [train], [validation])
+    rig = rig or bench_of(case).user_rig(case)
+    diagnosis = diagnose(rig, [train], [validation], most_windows=most_windows)
     order = [row.candidate.name for row in diagnosis.ranking]
     name = bench_of(case).public_name(case)
     place = order.index(name) + 1 if name in order else 0

@@ -28,7 +28,11 @@ def cut(folder, *regions, signal="slide.position"):
     return path
 
 
-@pytest.mark.parametrize("plant", PLANTS)
+SLOW = ("crr_rig", "crr_arm")  # half a minute each: linkages
+ANY = [pytest.param(each, marks=pytest.mark.slow) if each in SLOW else each for each in PLANTS]
+
+
+@pytest.mark.parametrize("plant", ANY)
 def test_every_plant_has_a_table_a_map_and_a_step(tmp_path, plant):
     (tmp_path / "rig.toml").write_text(f'plant = "{plant}"\n')
     words = ("--json", tmp_path / "modes.json", "--export", tmp_path / "modes", *BRIEF)

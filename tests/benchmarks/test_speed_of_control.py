@@ -1,8 +1,8 @@
 """Speed of linear, nonlinear and hybrid MPC beside rivals: the rows of study ``control-speed``.
 
-Run it with ``pytest tests/benchmarks -s --benchmark-enable``, or ``workbench study control-speed``
-for the whole table.  CPU time counts, because other work on the machine would count in wall time;
-nothing is asserted about it, only that what is timed is right.
+Run it with ``pytest tests/benchmarks -s --benchmark-enable -m ""``, or ``workbench study
+control-speed`` for the whole table.  CPU time counts, because other work on the machine would count
+in wall time; nothing is asserted about it, only that what is timed is right.
 """
 
 import numpy as np
@@ -18,6 +18,8 @@ from studies.control_speed_study import (
     on_the_gearbox,
     outcome,
 )
+
+pytestmark = pytest.mark.slow  # a minute and a half
 
 
 @pytest.fixture(scope="module")
