@@ -1,11 +1,13 @@
 """Diagnoses of spoiled recordings of the demo: none gets a confident wrong name."""
 
 import pytest
+from other_drive import recorded
 from test_adversarial_recordings import assert_unnamed, demo  # noqa: F401  (demo: a fixture)
 
 from studies import adversarial as spoil
 from workbench.diagnosis.diagnose import diagnose
-from workbench.diagnosis.result import Verdict
+from workbench.diagnosis.result import NAMING, Verdict
+from workbench.rig import default_rig
 
 A, B, PLACE = spoil.A, spoil.B, spoil.PLACE
 
@@ -43,3 +45,16 @@ def test_an_uneven_clock_hides_no_effect_and_makes_none(demo):  # noqa: F811
 
     assert found.ranking[0].candidate.name == "piston_leak"
     assert found.verdict in (Verdict.FOUND, Verdict.TIE)
+
+
+@pytest.mark.slow
+def test_a_drive_with_another_valve_gets_no_name():
+    """A twelfth of the position that came 70 ms late had stood in for how its lands open."""
+    train, validation = recorded(11), recorded(12, largest_v=1.0)
+    found = diagnose(default_rig("servo_drive"), [train], [validation])
+
+    assert found.verdict not in NAMING
+    assert any("unexplained errors remain" in each for each in found.warnings)
+    assert {"valve.flow_area_m2", "valve_dead_zone.half_width_v"} <= {
+        each.name for each in found.strained
+    }
