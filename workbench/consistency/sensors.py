@@ -140,8 +140,8 @@ def _without_saturated(plant: Plant, recording: Recording) -> tuple[Recording, l
 
 
 def missing(plant: Plant, recording: Recording) -> list[Finding]:
-    """A word on outputs that are silent for a tenth of the recording: nothing is told of then."""
-    found = []
+    """A word on outputs silent for a tenth of the recording, one for all that are so at once."""
+    said: dict[str, list[str]] = {}
     for name in plant.measured:
         gaps = _silences(np.isfinite(recording[name]))
         share = sum(length for _, length in gaps) / len(recording)
@@ -150,12 +150,15 @@ def missing(plant: Plant, recording: Recording) -> list[Finding]:
         first, length = max(gaps, key=lambda each: each[1])
         begin_s, end_s = (recording.sample_time_s * k for k in (first, first + length))
         what = (
-            f"has no samples for {share:.0%} of the recording, the longest time from "
+            f"no samples for {share:.0%} of the recording, the longest time from "
             f"{begin_s:.4g} to {end_s:.4g} s"
         )
-        remedy = "nothing is told of these times; check the sensor"
-        found.append(_finding(Weight.NOTICE, recording, name, what, remedy))
-    return found
+        said.setdefault(what, []).append(public_name(name))
+    remedy, where = "nothing is told of these times", recording.source or recording.name
+    return [
+        Finding(Weight.NOTICE, where, ", ".join(names), what, remedy)
+        for what, names in said.items()
+    ]
 
 
 def _silences(recorded: np.ndarray) -> list[tuple[int, int]]:
