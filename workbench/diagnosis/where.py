@@ -53,7 +53,7 @@ def locate(problem: Problem, recordings: Sequence[Recording]) -> Where | None:
     """Log-likelihood gain of each balance, and the missing flow of the one that gains most.
 
     All recordings are followed one after the other.  None for a plant without states, or where no
-    filter run stayed finite.
+    filter run stayed finite or met a sample.
     """
     plant, flows = with_missing_flows(problem.whole.lean())
     windows, recording = problem.base.windows, joined(recordings)
@@ -76,6 +76,8 @@ def locate(problem: Problem, recordings: Sequence[Recording]) -> Where | None:
     filters = lacking({worst.parameter: likeliest})
     result, other = (smooth(filters, recording, q / likeliest) for q in (likeliest, neighbour))
     heard = result.watched(UNHEARD)
+    if not heard.any():
+        return None
     term, softer = (each.unknown[0, heard] for each in (result, other))
     time_s, course = result.time_s[heard], _course(plant, recording, result, decimate, worst)
     course = course.part(heard)
