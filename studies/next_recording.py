@@ -66,7 +66,7 @@ class Separation:
 def _alike(found: Diagnosis | None) -> tuple[str, ...]:
     """What the leader of a ranking is not told from."""
     leader = found.ranking[0] if found and found.ranking else None
-    return (*leader.tied_with, *leader.crowd) if leader else ()
+    return leader.alike if leader else ()
 
 
 def recorded(case: Case, asked: NextRecording) -> Recording:

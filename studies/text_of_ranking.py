@@ -54,13 +54,11 @@ def sizes_text(row: Ranked) -> str:
 
 def _remark(row: Ranked, leader: Ranked) -> str:
     """What speaks for or against a candidate; passing alone makes it no second cause."""
-    if row.accepted and row.tied_with:
-        return f"accepted, tied with {', '.join(row.tied_with)}"
-    if row.accepted and row is not leader and row.candidate.name not in leader.crowd:
+    if not row.accepted:
+        return "; ".join((*reasons(row), *([_blind_text(row)] if row.blind else [])))
+    if row is not leader and row.candidate.name not in leader.alike:
         return f"would pass, but {leader.candidate.name} explains more"
-    if row.accepted:
-        return "accepted"
-    return "; ".join((*reasons(row), *([_blind_text(row)] if row.blind else [])))
+    return f"accepted, tied with {', '.join(row.tied_with)}" if row.tied_with else "accepted"
 
 
 def reasons(row: Ranked) -> Iterator[str]:

@@ -1,11 +1,11 @@
 """Beside the ranking of the scan: priors three times as wide, and the classical score."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from test_diagnosis import bench, coulomb, nothing
+from test_report import ranked
 
 from studies.hidden_answers import widened
 from workbench.diagnosis.metric import metric_at
@@ -101,8 +101,8 @@ def test_another_first_name_with_wide_priors_is_warned_of(pushed):
     _, profiles = pushed
     first, second, *_ = sorted(profiles.values(), key=lambda each: -each.drop)
     better = replace(second, drop_wide=2.0 * first.drop_wide + 1.0)
-    row = SimpleNamespace(candidate=first.candidate, tied_with=(), crowd=())
-    tied = SimpleNamespace(**{**vars(row), "tied_with": (second.candidate.name,)})
+    row = ranked(first.candidate, 0.5)
+    tied = replace(row, tied_with=(second.candidate.name,))
     (said,) = unsteady((row,), [first, better], Verdict.FOUND)
 
     name = second.candidate.name

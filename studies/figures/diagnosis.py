@@ -56,7 +56,8 @@ def ranking_figure(found: Diagnosis) -> Figure:
         axes = figure.subplots()
         axes.set_yticks(range(len(rows)), [_ranked_name(row.candidate.name, tied) for row in rows])
         for label, row in zip(axes.get_yticklabels(), rows, strict=True):
-            label.set_fontweight("bold" if row.accepted and _leads(row, leader) else "normal")
+            named = row is leader or row.candidate.name in leader.alike
+            label.set_fontweight("bold" if row.accepted and named else "normal")
         _draw_drops(axes, rows)
         axes.set_ylim(len(rows) - 0.5, -0.5)
         axes.set_xlim(0.0, 105.0)
@@ -66,12 +67,6 @@ def ranking_figure(found: Diagnosis) -> Figure:
         if axes.containers:
             figure.legend(loc="outside lower center", ncols=3, columnspacing=1.0)
     return figure
-
-
-def _leads(row: Ranked, leader: Ranked) -> bool:
-    """Whether a row is what is named, or what does the same."""
-    alike = (leader.candidate.name, *leader.tied_with, *leader.crowd)
-    return row.candidate.name in alike
 
 
 def _draw_drops(axes: Axes, rows: Sequence[Ranked]) -> None:

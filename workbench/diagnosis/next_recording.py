@@ -58,7 +58,7 @@ def recommended(
     if leader.fit is None:
         return None
     progress("next recording")
-    alike = (*leader.tied_with, *leader.crowd)
+    alike = leader.alike
     if verdict is Verdict.SMALL_PROXY:
         alike = (*alike, *(r.candidate.name for r in ranking[1:] if r.reasons == (SHARE_REASON,)))
         alike = alike[: LARGEST_TIE - 1]

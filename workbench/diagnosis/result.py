@@ -90,8 +90,7 @@ class Ranked:
     accepted, reasons
         Whether it passes every criterion of diagnosis.md 1.6, and why not in words.
     drop_wide
-        Share of the misfit that the scan would see go with priors three times as wide; NaN where
-        the scan did not ask.
+        Share of the misfit that the scan sees go with priors thrice as wide; NaN if not asked.
     modification_index
         Fall of chi2 that the smallest size of the scan promises; NaN likewise.
     plain_validation
@@ -122,6 +121,11 @@ class Ranked:
     modification_index: float = float("nan")
     fit: Fit | None = field(default=None, repr=False)
     validation: Fit | None = field(default=None, repr=False)
+
+    @property
+    def alike(self) -> tuple[str, ...]:
+        """All that cannot be told apart from it, in the printed tie and beyond."""
+        return (*self.tied_with, *self.crowd)
 
     @property
     def blind(self) -> bool:

@@ -33,7 +33,7 @@ STEADY = 0.02  # of a size, by which the last round may still move it
 def with_settled_sizes(problem: Problem, ranking: tuple[Ranked, ...]) -> tuple[Ranked, ...]:
     """The ranking with its leader and all that do the same settled; the order stays."""
     leader = ranking[0]
-    named = {leader.candidate.name, *leader.tied_with, *leader.crowd}
+    named = {leader.candidate.name, *leader.alike}
     return tuple(
         _settled_row(problem, row, row is leader)
         if row.fit and row.candidate.name in named

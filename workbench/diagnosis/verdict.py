@@ -88,7 +88,7 @@ def unsteady(
     if leader is None or not any(p.candidate == leader.candidate for p in profiles):
         return ()
     first = max(profiles, key=lambda each: each.drop_wide).candidate
-    known = (leader.candidate.name, *leader.tied_with, *leader.crowd)
+    known = (leader.candidate.name, *leader.alike)
     if first == profiles[0].candidate or first.name in known:
         return ()
     return (f"with priors {WIDER:g} times as wide {first.name} would lead the scan",)
@@ -177,8 +177,7 @@ def _spoken(row: Ranked) -> str:
 def _too_weak(ranking: tuple[Ranked, ...]) -> str:
     leader = ranking[0]
     if leader.accepted:
-        rivals = ", ".join((*leader.tied_with, *leader.crowd))
-        return f"{_spoken(leader)} and {rivals} do the same to this recording"
+        return f"{_spoken(leader)} and {', '.join(leader.alike)} do the same to this recording"
     return _blind(ranking)
 
 

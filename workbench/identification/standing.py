@@ -10,12 +10,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import inf, isnan, nan
 
+from workbench.diagnosis.judge import LEAST_SIZE
 from workbench.effect import Parameter
 from workbench.identification.result import Estimate
 from workbench.rig import Rig
 
 FAR = 5.0  # prior deviations
-NEGLIGIBLE = 0.03  # of a typical strength: no rig is believed to know a weak one better than that
 AT_BOUND = 1e-3  # of the range, or of the typical size where that is smaller: solvers stop before
 
 
@@ -50,7 +50,7 @@ def standing(rig: Rig, found: Estimate) -> Standing:
     """How a parameter of the rig, named in full, stands to the rig's own value and its range."""
     known, prior = rig.plant.parameters[found.name], rig.standard_deviation(found.name)
     if prior > 0.0 and known.null is not None and found.name not in rig.deviations:
-        prior = max(prior, NEGLIGIBLE * abs(known.typical))
+        prior = max(prior, LEAST_SIZE * abs(known.typical))  # nothing to know of a weaker one
     off = abs(found.value - rig.plant.values[found.name]) / prior if prior > 0.0 else nan
     return Standing(off, end_reached(known, found.value))
 
