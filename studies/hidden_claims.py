@@ -23,6 +23,7 @@ from workbench.diagnosis.result import Verdict
 
 STRONG = 0.60  # of the misfit, removed by an effect whose size is to be right
 CLOSE = 0.10  # of a hidden size
+KNOWN_TO = 2.0  # standard deviations that a size may be off
 CHANCE = 0.05  # of a sample that speaks against a bar that is reached
 MAPPED = (Kind.EFFECT, Kind.LAW, Kind.NOTHING)  # in the confusion matrix
 
@@ -87,7 +88,9 @@ def _sizes(strong: Sequence[Row]) -> Iterator[Claim]:
     if strong:
         errors = [abs(r.found / r.size - 1.0) for r in strong]
         close = sum(error <= CLOSE for error in errors)
-        found = f"{median(errors):.1%} ({close} of {len(errors)} within {CLOSE:.0%})"
+        told = sum(abs(r.found - r.size) <= KNOWN_TO * r.deviation for r in strong)
+        counted = f"{close} of {len(errors)} within {CLOSE:.0%}, {told} within two deviations"
+        found = f"{median(errors):.1%} ({counted})"
         what = f"median error of the size of strong effects, at most {CLOSE:.0%}"
         yield Claim(what, found, median(errors) <= CLOSE)
 

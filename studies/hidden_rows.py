@@ -40,8 +40,9 @@ class Row:
     ----------
     hidden, size
         What was hidden, in SI; of a pair both names, and no size.
-    first, found
-        What the ranking puts first, and its size; of a pair all that was accepted.
+    first, found, deviation
+        What the ranking puts first, its size, and the standard deviation that is told of that; of
+        a pair all that was accepted.
     place
         Rank of the hidden effect from 1, 0 where there is none.
     tied
@@ -70,6 +71,7 @@ class Row:
     place: int
     tied: bool
     right: bool
+    deviation: float = nan
     own_drop: float = nan
     balance: str = ""
     balance_right: bool = False
@@ -99,8 +101,8 @@ def row_again(kept: Mapping[str, Any]) -> Row:
 
 def table(rows: Sequence[Row]) -> str:
     """One line for each answer."""
-    head = ("asked", "plant", "hidden", "seed", "size", "first in ranking", "found", "verdict",
-            "rank", "own drop", "balance", "right", "s")  # fmt: skip
+    head = ("asked", "plant", "hidden", "seed", "size", "first in ranking", "found", "+-",
+            "verdict", "rank", "own drop", "balance", "right", "s")  # fmt: skip
     return columns(
         head,
         [
@@ -112,6 +114,7 @@ def table(rows: Sequence[Row]) -> str:
                 _number(row.size, ".3g"),
                 row.first or "-",
                 _number(row.found, ".3g"),
+                _number(row.deviation, ".2g"),
                 row.verdict,
                 str(row.place or "-"),
                 _number(row.own_drop, ".0%"),

@@ -13,7 +13,12 @@ from workbench.fitting.begun_anew import begun_anew
 from workbench.fitting.errors import Errors, errors_of
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.own_errors import by_own_errors
-from workbench.fitting.posterior import FLAT, fitted_rig, posterior_covariance
+from workbench.fitting.posterior import (
+    FLAT,
+    fitted_rig,
+    posterior_covariance,
+    posterior_deviation,
+)
 from workbench.fitting.problem import NO_EVIDENCE, pose, proves_nothing
 from workbench.fitting.short_windows import better_from_short_windows
 from workbench.fitting.start_states import as_it_came
@@ -121,7 +126,7 @@ def _correlations(covariance: np.ndarray) -> np.ndarray:
 
 def _rows(fit: Fit, covariance: np.ndarray) -> tuple[FittedParameter, ...]:
     unknowns, values = fit.unknowns, fit.plant.values
-    deviation = np.sqrt(np.diag(covariance))
+    curvature, deviation = np.sqrt(np.diag(covariance)), posterior_deviation(fit)
     rows = []
     for k, name in enumerate(unknowns.names):
         room = min(values[name] - unknowns.lower[k], unknowns.upper[k] - values[name])
@@ -133,9 +138,9 @@ def _rows(fit: Fit, covariance: np.ndarray) -> tuple[FittedParameter, ...]:
                 prior=float(unknowns.prior[k]),
                 prior_deviation=float(unknowns.scale[k]) if believed == 1.0 else float("inf"),
                 value=values[name],
-                deviation=float("nan") if at_bound else float(deviation[k] * unknowns.scale[k]),
+                deviation=float("nan") if at_bound else float(deviation[k]),
                 at_bound=at_bound,
-                flat=bool(deviation[k] * believed > FLAT) and not at_bound,
+                flat=bool(curvature[k] * believed > FLAT) and not at_bound,
             )
         )
     return tuple(rows)

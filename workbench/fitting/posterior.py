@@ -48,16 +48,35 @@ class Moved:
 
 
 def posterior_deviation(fit: Fit) -> np.ndarray:
-    """Standard deviation of each unknown from the curvature of the cost, shape (n_p,).
+    """Standard deviation of each unknown, shape (n_p,), the larger of two; no more than the prior.
 
-    Scales already carry the correlation time of the residuals, so no further inflation is due.
-    One that the fit holds at a bound has none, NaN: the curvature says nothing of it.
+    One is that of the curvature of the cost, H^-1, true where errors are as the scales tell them:
+    these carry their correlation time.  Where the plant lacks something errors go together over
+    many samples and outputs, and windows pull a parameter apart by more than that.  How far tells
+
+        H^-1 (n / (n - 1) sum_w g_w g_w' + Lambda) H^-1
+
+    with g_w the gradient of each of the n windows and Lambda the weights of the prior.  What all
+    windows have wrong alike neither tells.  One that the fit holds at a bound has none, NaN.
+
+    Source: White 1982, "Maximum likelihood estimation of misspecified models"; in groups of errors
+    that go together, Liang and Zeger 1986.
     """
     if not len(fit.unknowns):
         return np.zeros(0)
-    normal = _normal(fit)
-    variance = np.maximum(np.diag(np.linalg.inv(normal.hessian)), 0.0)
-    return np.where(normal.precision > 0.0, np.sqrt(variance) * fit.unknowns.scale, np.nan)
+    normal, prior = _normal(fit), fit.unknowns.precision
+    inverse = np.linalg.inv(normal.hessian)
+    curvature = np.sqrt(np.maximum(np.diag(inverse), 0.0))
+    most = np.maximum(1.0 / np.sqrt(np.maximum(prior, 1e-300)), curvature)
+    size = np.clip(np.sqrt(np.diag(inverse @ _pulls(normal) @ inverse)), curvature, most)
+    return np.where(normal.precision > 0.0, size * fit.unknowns.scale, np.nan)
+
+
+def _pulls(normal: Normal) -> np.ndarray:
+    """Covariance of the gradient, of the windows as they differ and of the prior, (n_p, n_p)."""
+    by_window = np.einsum("wrp,wr->wp", normal.derivatives, normal.residual)
+    n = len(by_window)
+    return n / max(n - 1, 1) * (by_window.T @ by_window) + np.diag(normal.precision)
 
 
 def posterior_covariance(fit: Fit) -> np.ndarray:

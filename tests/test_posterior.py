@@ -1,0 +1,62 @@
+"""Standard deviations of a fit: how far it would be off on other recordings."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import lsim
+
+from tests.linear_plant import DAMPING_N_S_M, MASS_KG, STIFFNESS_N_M, cart
+from workbench.fitting.gauss_newton import fit_windows
+from workbench.fitting.posterior import posterior_covariance, posterior_deviation
+from workbench.fitting.unknowns import Unknowns
+from workbench.fitting.windows import cut_windows
+from workbench.recording import Recording
+
+SAMPLE_S, LENGTH, WINDOWS = 0.02, 100, 16
+NOISE_M, SCALE_KG = 2e-4, 0.2
+MASS = "cart.mass_kg"
+
+
+def fitted(stiffness_spread, rng):
+    """The mass, fitted to carts on springs that differ from one recording to the next."""
+    plant, sigma = cart(), {"cart.position_m": NOISE_M}
+    pushes = rng.uniform(-5.0, 5.0, (WINDOWS, LENGTH // 5)).repeat(5, axis=1)
+    springs = STIFFNESS_N_M * (1.0 + stiffness_spread * rng.standard_normal(WINDOWS))
+    recordings = [
+        Recording(
+            f"cart {k}",
+            SAMPLE_S,
+            {
+                "drive.force_n": push,
+                "cart.position_m": moved(spring, push) + NOISE_M * rng.standard_normal(LENGTH),
+            },
+        )
+        for k, (spring, push) in enumerate(zip(springs, pushes, strict=True))
+    ]
+    windows = cut_windows(plant, recordings, sigma, SAMPLE_S * LENGTH, WINDOWS)
+    rest = np.zeros_like(windows.start)
+    windows = replace(windows, start=rest, start_deviation=np.full_like(rest, 1e-6))
+    unknowns = Unknowns((MASS,), *map(np.array, ([MASS_KG], [SCALE_KG], [0.5], [8.0], [1e-6])))
+    fit = fit_windows(windows, unknowns, iterations=8)
+    windows = windows.rescaled(fit.residual)
+    return fit_windows(windows, unknowns, fit.point, iterations=8)
+
+
+def moved(spring, push):
+    """Position of a cart from rest, exact for a force that holds between samples."""
+    A = [[0.0, 1.0], [-spring / MASS_KG, -DAMPING_N_S_M / MASS_KG]]
+    system = (A, [[0.0], [1.0 / MASS_KG]], [[1.0, 0.0]], [[0.0]])
+    return lsim(system, push, SAMPLE_S * np.arange(LENGTH), interp=False)[1]
+
+
+@pytest.mark.parametrize("spread", [0.0, 0.1], ids=["noise alone", "springs that differ"])
+def test_a_deviation_tells_how_far_fits_of_other_recordings_are_apart(spread):
+    rng = np.random.default_rng(11)
+    fits = [fitted(spread, rng) for _ in range(30)]
+    apart = np.std([fit.plant.values[MASS] for fit in fits])
+    told = np.median([posterior_deviation(fit)[0] for fit in fits])
+    curvature = np.median([SCALE_KG * posterior_covariance(fit)[0, 0] ** 0.5 for fit in fits])
+
+    assert told == pytest.approx(apart, rel=0.3)
+    assert spread == 0.0 or curvature < told / 3.0
