@@ -13,14 +13,19 @@ from workbench.fitting.unknowns import Unknowns
 from workbench.fitting.windows import cut_windows
 from workbench.recording import Recording
 
-SAMPLE_S, LENGTH, WINDOWS = 0.02, 100, 16
+SAMPLE_S, LENGTH, WINDOWS = 0.02, 100, 12
 NOISE_M, SCALE_KG = 2e-4, 0.2
 MASS = "cart.mass_kg"
 
 
-def fitted(stiffness_spread, rng):
+@pytest.fixture(scope="module")
+def plant():
+    return cart()
+
+
+def fitted(plant, stiffness_spread, rng):
     """The mass, fitted to carts on springs that differ from one recording to the next."""
-    plant, sigma = cart(), {"cart.position_m": NOISE_M}
+    sigma = {"cart.position_m": NOISE_M}
     pushes = rng.uniform(-5.0, 5.0, (WINDOWS, LENGTH // 5)).repeat(5, axis=1)
     springs = STIFFNESS_N_M * (1.0 + stiffness_spread * rng.standard_normal(WINDOWS))
     recordings = [
@@ -51,9 +56,9 @@ def moved(spring, push):
 
 
 @pytest.mark.parametrize("spread", [0.0, 0.1], ids=["noise alone", "springs that differ"])
-def test_a_deviation_tells_how_far_fits_of_other_recordings_are_apart(spread):
+def test_a_deviation_tells_how_far_fits_of_other_recordings_are_apart(plant, spread):
     rng = np.random.default_rng(11)
-    fits = [fitted(spread, rng) for _ in range(30)]
+    fits = [fitted(plant, spread, rng) for _ in range(20)]
     apart = np.std([fit.plant.values[MASS] for fit in fits])
     told = np.median([posterior_deviation(fit)[0] for fit in fits])
     curvature = np.median([SCALE_KG * posterior_covariance(fit)[0, 0] ** 0.5 for fit in fits])
