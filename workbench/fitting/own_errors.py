@@ -21,6 +21,7 @@ import numpy as np
 from workbench.fitting.continued import continued
 from workbench.fitting.errors import at_noise, only_noise, penalised_rmse, white_level
 from workbench.fitting.gauss_newton import Fit, fit_windows
+from workbench.fitting.together import with_worth
 from workbench.fitting.windows import Windows
 
 WEIGHINGS = 2  # the second by what the first leaves
@@ -31,7 +32,7 @@ ROUNDS = 4
 
 def weighed_anew(fit: Fit, iterations: int = ITERATIONS) -> Fit:
     """The fit followed further with weights from the errors that it leaves."""
-    windows = fit.windows.rescaled(fit.residual)
+    windows = with_worth(fit, fit.windows.rescaled(fit.residual).worth(1.0))
     return fit_windows(windows, fit.unknowns, fit.point, iterations)
 
 
@@ -70,7 +71,7 @@ def by_own_errors(fit: Fit) -> Fit:
 
 def better_of(fit: Fit, tried: Fit) -> Fit:
     """Of two fits of the same windows the one with the larger posterior; see the module."""
-    samples = effective_by_output(fit.windows)
+    samples = np.minimum(effective_by_output(fit.windows), effective_by_output(tried.windows))
     noise = np.fmin(fit.windows.noise, np.fmin(white_level(fit), white_level(tried)))
 
     def surprise(each: Fit) -> float:

@@ -9,7 +9,8 @@ from math import inf, isnan, nan
 import numpy as np
 
 from workbench.fitting.gauss_newton import Fit
-from workbench.fitting.linearised import Normal, normal_equations, rescaled
+from workbench.fitting.linearised import Normal
+from workbench.fitting.together import normal_of, pulls
 from workbench.law_range import seen_in
 from workbench.rig import Rig
 from workbench.rig_laws import Ranges, laws_of
@@ -54,7 +55,7 @@ def posterior_deviation(fit: Fit) -> np.ndarray:
     these carry their correlation time.  Where the plant lacks something errors go together over
     many samples and outputs, and windows pull a parameter apart by more than that.  How far tells
 
-        H^-1 (n / (n - 1) sum_w g_w g_w' + Lambda) H^-1
+        H^-1 (n cov(g_w) + Lambda) H^-1
 
     with g_w the gradient of each of the n windows and Lambda the weights of the prior.  What all
     windows have wrong alike neither tells.  One that the fit holds at a bound has none, NaN.
@@ -68,15 +69,9 @@ def posterior_deviation(fit: Fit) -> np.ndarray:
     inverse = np.linalg.inv(normal.hessian)
     curvature = np.sqrt(np.maximum(np.diag(inverse), 0.0))
     most = np.maximum(1.0 / np.sqrt(np.maximum(prior, 1e-300)), curvature)
-    size = np.clip(np.sqrt(np.diag(inverse @ _pulls(normal) @ inverse)), curvature, most)
+    spread = pulls(normal) + np.diag(normal.precision)
+    size = np.clip(np.sqrt(np.diag(inverse @ spread @ inverse)), curvature, most)
     return np.where(normal.precision > 0.0, size * fit.unknowns.scale, np.nan)
-
-
-def _pulls(normal: Normal) -> np.ndarray:
-    """Covariance of the gradient, of the windows as they differ and of the prior, (n_p, n_p)."""
-    by_window = np.einsum("wrp,wr->wp", normal.derivatives, normal.residual)
-    n = len(by_window)
-    return n / max(n - 1, 1) * (by_window.T @ by_window) + np.diag(normal.precision)
 
 
 def posterior_covariance(fit: Fit) -> np.ndarray:
@@ -95,8 +90,7 @@ def _normal(fit: Fit) -> Normal:
     Residuals are weighted by the error model of this very fit: the scales that it was fitted with
     may belong to a plant that lacked something and was far worse.
     """
-    at = rescaled(fit.derivatives, fit.windows, fit.windows.rescaled(fit.residual))
-    return normal_equations(at, fit.unknowns)
+    return normal_of(fit, fit.windows.rescaled(fit.residual))
 
 
 def fitted_rig(rig: Rig, fit: Fit, added: Sequence[str] = ()) -> Rig:
