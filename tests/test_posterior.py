@@ -8,7 +8,7 @@ from scipy.signal import lsim
 
 from tests.linear_plant import DAMPING_N_S_M, MASS_KG, STIFFNESS_N_M, cart
 from workbench.fitting.gauss_newton import fit_windows
-from workbench.fitting.own_errors import weighed_anew
+from workbench.fitting.own_errors import weighed_by_worth
 from workbench.fitting.posterior import posterior_covariance, posterior_deviation
 from workbench.fitting.unknowns import Unknowns
 from workbench.fitting.windows import cut_windows
@@ -71,7 +71,7 @@ def test_a_deviation_tells_how_far_fits_of_other_recordings_are_apart(plant, spr
 
 def test_windows_are_worth_what_their_scales_say_where_nothing_is_missing(plant):
     rng = np.random.default_rng(2)
-    worth = [weighed_anew(fitted(plant, 0.0, rng)).windows.errors.together for _ in range(5)]
+    worth = [weighed_by_worth(fitted(plant, 0.0, rng)).windows.errors.together for _ in range(5)]
 
     assert np.median(worth) < 1.5
 
@@ -80,7 +80,7 @@ def test_a_prior_is_not_outvoted_by_errors_that_go_together(plant):
     """Springs are 10 % apart: sixteen windows know the mass no better than a prior of 2 % does."""
     rng = np.random.default_rng(3)
     plain = [fitted(plant, 0.1, rng, precision=(SCALE_KG / 0.04) ** 2) for _ in range(10)]
-    worth = [weighed_anew(fit) for fit in plain]
+    worth = [weighed_by_worth(fit) for fit in plain]
     before, after = (np.std([fit.plant.values[MASS] for fit in fits]) for fits in (plain, worth))
 
     assert np.median([fit.windows.errors.together for fit in worth]) > 20.0

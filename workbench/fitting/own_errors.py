@@ -32,6 +32,12 @@ ROUNDS = 4
 
 def weighed_anew(fit: Fit, iterations: int = ITERATIONS) -> Fit:
     """The fit followed further with weights from the errors that it leaves."""
+    windows = fit.windows.rescaled(fit.residual)
+    return fit_windows(windows, fit.unknowns, fit.point, iterations)
+
+
+def weighed_by_worth(fit: Fit, iterations: int = ITERATIONS) -> Fit:
+    """The same, the windows counted by what they are worth beside the priors."""
     windows = with_worth(fit, fit.windows.rescaled(fit.residual).worth(1.0))
     return fit_windows(windows, fit.unknowns, fit.point, iterations)
 
