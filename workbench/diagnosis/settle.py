@@ -6,8 +6,8 @@ best count least, and what the nominal parameters have moved to imitate it stays
 come out too small.  With weights of its own the fit goes on to where the effect has its size, and
 windows are counted by what they are worth beside the priors (:mod:`workbench.fitting.together`):
 whether an effect is missing is asked against all that nominal parameters can imitate, how large it
-is against what is likely of them.  The leader's size is then looked for beside it too (:mod:`workbench.fitting.resized`).  The drops stay
-those of the common weights.
+is against what is likely of them.  The leader's size is then looked for beside it too
+(:mod:`workbench.fitting.resized`).  The drops stay those of the common weights.
 
 Source: diagnosis.md 1.4 (scales from the residuals of the model itself), repeated as in iteratively
 reweighted least squares (Holland and Welsch 1977).

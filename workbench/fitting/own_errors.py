@@ -77,7 +77,7 @@ def by_own_errors(fit: Fit) -> Fit:
 
 def better_of(fit: Fit, tried: Fit) -> Fit:
     """Of two fits of the same windows the one with the larger posterior; see the module."""
-    samples = np.minimum(effective_by_output(fit.windows), effective_by_output(tried.windows))
+    samples = effective_by_output(fit.windows)
     noise = np.fmin(fit.windows.noise, np.fmin(white_level(fit), white_level(tried)))
 
     def surprise(each: Fit) -> float:
