@@ -52,7 +52,9 @@ def sound(problem, followed):
 
 def unsure(refit):
     """The same with a size of one deviation."""
-    return replace(refit, size={k: Size(s.value, abs(s.value)) for k, s in refit.size.items()})
+    return replace(
+        refit, size={k: Size(s.value, np.nan, abs(s.value)) for k, s in refit.size.items()}
+    )
 
 
 def named(refit, followed, k):
@@ -74,7 +76,7 @@ def test_a_size_of_one_deviation_is_not_accepted(problem, sound):
 
 def test_a_size_at_the_whole_of_itself_has_no_deviation_and_is_not_refused_for_that(problem, sound):
     """So a lag of a sensor ends that is all there: its typical size is its bound."""
-    whole = {name: Size(size.value, np.nan) for name, size in sound.size.items()}
+    whole = {name: Size(size.value, np.nan, np.nan) for name, size in sound.size.items()}
 
     assert reasons_against(problem.base, replace(sound, size=whole)) == ()
 

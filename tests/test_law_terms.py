@@ -13,12 +13,13 @@ from workbench.diagnosis import addition
 from workbench.diagnosis import diagnose as diagnosing
 from workbench.diagnosis.addition import NO_LAW, add_law
 from workbench.diagnosis.diagnose import diagnose
-from workbench.diagnosis.judge import distinct, share_removed
+from workbench.diagnosis.judge import share_removed
 from workbench.diagnosis.law import _at_once, _law, better_base, empirical_law, standing, with_terms
 from workbench.diagnosis.law_choice import _Secants, _stable, worth_scanning
 from workbench.diagnosis.refit import refit_from
 from workbench.diagnosis.result import LawTerm, Size, Verdict
 from workbench.diagnosis.scan import scan_catalogue
+from workbench.diagnosis.size import distinct
 from workbench.effects.law_features import Factor, Here, product, written
 from workbench.fitting.gauss_newton import fit_windows
 from workbench.fitting.linearised import Point
@@ -202,8 +203,8 @@ def test_each_term_of_a_law_that_is_read_off_is_there(monkeypatch):
 
 
 def test_what_is_at_a_bound_has_no_deviation_that_could_refuse_it():
-    assert distinct(Size(1.0, float("nan"))) and distinct(Size(1.0, 0.5))
-    assert not distinct(Size(1.0, 0.6)) and not distinct(Size(1.0, 0.2), null=0.9)
+    assert distinct(Size(1.0, 0.7, float("nan"))) and distinct(Size(1.0, 0.7, 0.5))
+    assert not distinct(Size(1.0, 0.7, 0.6)) and not distinct(Size(1.0, 0.2, 0.2), null=0.9)
 
 
 def secants(gains):

@@ -8,7 +8,6 @@ from scipy.signal import lsim
 
 from tests.linear_plant import DAMPING_N_S_M, MASS_KG, STIFFNESS_N_M, cart
 from workbench.fitting.gauss_newton import fit_windows
-from workbench.fitting.own_errors import weighed_by_worth
 from workbench.fitting.posterior import posterior_covariance, posterior_deviation
 from workbench.fitting.unknowns import Unknowns
 from workbench.fitting.windows import cut_windows
@@ -24,7 +23,7 @@ def plant():
     return cart()
 
 
-def fitted(plant, stiffness_spread, rng, precision=1e-6):
+def fitted(plant, stiffness_spread, rng):
     """The mass, fitted to carts on springs that differ from one recording to the next."""
     sigma = {"cart.position_m": NOISE_M}
     pushes = rng.uniform(-5.0, 5.0, (WINDOWS, LENGTH // 5)).repeat(5, axis=1)
@@ -43,7 +42,7 @@ def fitted(plant, stiffness_spread, rng, precision=1e-6):
     windows = cut_windows(plant, recordings, sigma, SAMPLE_S * LENGTH, WINDOWS)
     rest = np.zeros_like(windows.start)
     windows = replace(windows, start=rest, start_deviation=np.full_like(rest, 1e-6))
-    unknowns = Unknowns((MASS,), *map(np.array, ([MASS_KG], [SCALE_KG], [0.5], [8.0], [precision])))
+    unknowns = Unknowns((MASS,), *map(np.array, ([MASS_KG], [SCALE_KG], [0.5], [8.0], [1e-6])))
     fit = fit_windows(windows, unknowns, iterations=8)
     windows = windows.rescaled(fit.residual)
     return fit_windows(windows, unknowns, fit.point, iterations=8)
@@ -67,21 +66,3 @@ def test_a_deviation_tells_how_far_fits_of_other_recordings_are_apart(plant, spr
 
     assert told == pytest.approx(apart, rel=0.4)
     assert spread == 0.0 or curvature < told / 5.0
-
-
-def test_windows_are_worth_what_their_scales_say_where_nothing_is_missing(plant):
-    rng = np.random.default_rng(2)
-    worth = [weighed_by_worth(fitted(plant, 0.0, rng)).windows.errors.together for _ in range(5)]
-
-    assert np.median(worth) < 1.5
-
-
-def test_a_prior_is_not_outvoted_by_errors_that_go_together(plant):
-    """Springs are 10 % apart: sixteen windows know the mass no better than a prior of 2 % does."""
-    rng = np.random.default_rng(3)
-    plain = [fitted(plant, 0.1, rng, precision=(SCALE_KG / 0.04) ** 2) for _ in range(10)]
-    worth = [weighed_by_worth(fit) for fit in plain]
-    before, after = (np.std([fit.plant.values[MASS] for fit in fits]) for fits in (plain, worth))
-
-    assert np.median([fit.windows.errors.together for fit in worth]) > 20.0
-    assert after < 0.6 * before

@@ -11,7 +11,7 @@ the criterion.  A candidate is accepted when
 3. at least 20 % of the misfit beyond noise goes away, as the mean over training and held-out
    recordings and with no less than 10 % in training: less may stand for something else,
 4. its size is inside its bounds, more than 3 % of typical, and more than two standard deviations
-   from none.
+   from none, as the curvature of the cost tells these.
 
 A pair pays for the parameters of both, takes twice the share, and both sizes must be sound.
 """
@@ -25,8 +25,9 @@ import numpy as np
 
 from workbench.candidate import Candidate
 from workbench.diagnosis.refit import Refit, held_out_misfit, surplus
-from workbench.diagnosis.result import Law, Ranked, Size
+from workbench.diagnosis.result import Law, Ranked
 from workbench.diagnosis.scan import Profile
+from workbench.diagnosis.size import DISTINCT, distinct
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.own_errors import effective_by_output
 from workbench.fitting.problem import Problem
@@ -38,7 +39,6 @@ MOST_PLAIN = 1.02
 LEAST_SHARE = 0.20
 LEAST_TRAINING = 0.10
 LEAST_SIZE = 0.03
-DISTINCT = 2.0  # standard deviations
 FEWEST_WINDOWS = 6  # held out, for recordings of what does not move to refuse anything
 AT_BOUND = 1e-9  # relative: a value scaled and back is off by a rounding
 LARGEST_TIE = 3
@@ -119,15 +119,6 @@ def effective_samples(fit: Fit) -> float:
 def _size_reasons(refit: Refit) -> list[str]:
     """Size criteria: not negligible, not at a bound."""
     return [why for each in refit.candidate.singles for why in _reasons_of_size(refit, each)]
-
-
-def distinct(size: Size, null: float = 0.0) -> bool:
-    """True where a fitted size is no less than two of its standard deviations from ``null``.
-
-    At a bound there is no deviation (NaN) and nothing to refuse: a lag that is all there ends at
-    the whole of itself, and bounds that a size may not reach have a criterion of their own.
-    """
-    return not abs(size.value - null) < DISTINCT * size.deviation
 
 
 def _reasons_of_size(refit: Refit, candidate: Candidate) -> list[str]:

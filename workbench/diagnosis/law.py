@@ -16,12 +16,7 @@ from dataclasses import replace
 from math import nan
 
 from workbench.candidate import Candidate
-from workbench.diagnosis.judge import (
-    clearly_less,
-    distinct,
-    reasons_against,
-    share_removed,
-)
+from workbench.diagnosis.judge import clearly_less, reasons_against, share_removed
 from workbench.diagnosis.law_choice import worth_scanning
 from workbench.diagnosis.law_seed import refitted, seeds
 from workbench.diagnosis.refit import (
@@ -30,11 +25,11 @@ from workbench.diagnosis.refit import (
     held_out_drop,
     refit,
     refit_shaken,
-    sizes,
 )
-from workbench.diagnosis.result import Law, LawTerm, Size, Where
+from workbench.diagnosis.result import Law, LawTerm, Where
 from workbench.diagnosis.rough import rough_fit
 from workbench.diagnosis.scan import Profile, scan
+from workbench.diagnosis.size import Size, distinct, sizes
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.problem import Problem, improved_base, misfit
 from workbench.law_range import seen_in

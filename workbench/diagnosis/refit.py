@@ -12,17 +12,16 @@ from math import nan
 import numpy as np
 
 from workbench.candidate import Candidate
-from workbench.diagnosis.result import Size
 from workbench.diagnosis.rough import KEPT, Rough, windows_for
 from workbench.diagnosis.scan import Profile
 from workbench.diagnosis.shifts import Shift
+from workbench.diagnosis.size import Size, sizes
 from workbench.fitting.continued import continued
 from workbench.fitting.costs import best_of_each, points_costs
 from workbench.fitting.error_model import OUTLYING
 from workbench.fitting.errors import plain_ratio
 from workbench.fitting.gauss_newton import Fit, beyond_noise, fit_windows, leap
 from workbench.fitting.linearised import Point
-from workbench.fitting.posterior import posterior_deviation
 from workbench.fitting.problem import Problem, fitted_twice, misfit
 from workbench.fitting.pulled_in import pulled_in
 from workbench.fitting.resized import points_of_sizes
@@ -173,14 +172,6 @@ def counted_from(base: Fit, held_out: Fit | None, found: Refit) -> Refit:
         drop_validation=held_out_drop(held_out, found.validation),
         plain_validation=plain_ratio(held_out, found.validation),
     )
-
-
-def sizes(fit: Fit, names: tuple[str, ...]) -> dict[str, Size]:
-    """Values and posterior standard deviations of fitted parameters."""
-    deviation = posterior_deviation(fit)
-    values = fit.unknowns.values(fit.point.t)
-    index = {name: k for k, name in enumerate(fit.unknowns.names)}
-    return {n: Size(values[n], float(deviation[index[n]])) for n in names if n in index}
 
 
 def _drop(before: Fit | None, after: Fit | None) -> float:

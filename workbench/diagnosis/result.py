@@ -10,6 +10,7 @@ import numpy as np
 
 from workbench.candidate import Candidate
 from workbench.diagnosis.missing_term import Course, Dependence, Intensities, Loop
+from workbench.diagnosis.size import Size
 from workbench.effect import Kind
 from workbench.fitting.errors import SignalError
 from workbench.fitting.gauss_newton import Fit
@@ -59,14 +60,6 @@ class DecidedBy(Enum):
 def told(share: float) -> float:
     """A share of a misfit as it is told: an error that falls below the noise is all of it."""
     return min(share, 1.0)
-
-
-@dataclass(frozen=True)
-class Size:
-    """A fitted strength or form in SI, with its standard deviation."""
-
-    value: float
-    deviation: float
 
 
 @dataclass(frozen=True)

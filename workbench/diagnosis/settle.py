@@ -3,11 +3,9 @@
 A refit weighs errors as the model without its effect made them.  Its rivals must share these
 weights, or their drops could not be compared.  But where the effect was large, windows that show it
 best count least, and what the nominal parameters have moved to imitate it stays with them: sizes
-come out too small.  With weights of its own the fit goes on to where the effect has its size, and
-windows are counted by what they are worth beside the priors (:mod:`workbench.fitting.together`):
-whether an effect is missing is asked against all that nominal parameters can imitate, how large it
-is against what is likely of them.  The leader's size is then looked for beside it too
-(:mod:`workbench.fitting.resized`).  The drops stay those of the common weights.
+come out too small.  With weights of its own the fit goes on to where the effect has its size.  The
+leader's size is then looked for beside it too (:mod:`workbench.fitting.resized`).  The drops stay
+those of the common weights.
 
 Source: diagnosis.md 1.4 (scales from the residuals of the model itself), repeated as in iteratively
 reweighted least squares (Holland and Welsch 1977).
@@ -20,11 +18,12 @@ from dataclasses import replace
 
 from workbench.candidate import Candidate
 from workbench.diagnosis.judge import MOST_PLAIN
-from workbench.diagnosis.refit import ITERATIONS, sizes
-from workbench.diagnosis.result import Ranked, Size
+from workbench.diagnosis.refit import ITERATIONS
+from workbench.diagnosis.result import Ranked
+from workbench.diagnosis.size import Size, sizes
 from workbench.fitting.errors import plain_ratio
 from workbench.fitting.gauss_newton import Fit
-from workbench.fitting.own_errors import weighed_by_worth
+from workbench.fitting.own_errors import weighed_anew
 from workbench.fitting.problem import Problem
 from workbench.fitting.resized import resized
 
@@ -49,7 +48,7 @@ def settled(fit: Fit, candidate: Candidate) -> Fit:
     names = tuple(name for each in candidate.singles for name in each.moved)
     before = sizes(fit, names)
     for _ in range(ROUNDS):
-        fit = weighed_by_worth(fit, ITERATIONS)
+        fit = weighed_anew(fit, ITERATIONS)
         now = sizes(fit, names)
         if _steady(before, now):
             break

@@ -25,22 +25,18 @@ OUTLYING = 3.0  # windows worse than this many typical errors count no more than
 
 @dataclass(frozen=True)
 class ErrorModel:
-    """Typical errors of a model: see the module's docstring.  Arrays have shape (n_y, 1).
-
-    ``together`` is how much less the windows are worth: see :mod:`workbench.fitting.together`.
-    """
+    """Typical errors of a model: see the module's docstring.  Every field has shape (n_y, 1)."""
 
     quiet: np.ndarray
     share: np.ndarray
     quiet_samples: np.ndarray
     moving_samples: np.ndarray
-    together: float = 1.0
 
     def scale(self, activity: np.ndarray, noise: np.ndarray, correlated: bool = True) -> np.ndarray:
         """What residuals are to be divided by, shape (n_y, n_windows)."""
         size = np.sqrt(self.quiet**2 + (self.share * activity) ** 2)
         samples = np.where(activity > ACTIVE * noise, self.moving_samples, self.quiet_samples)
-        return size * np.sqrt(samples * self.together) if correlated else size
+        return size * np.sqrt(samples) if correlated else size
 
 
 def error_model(

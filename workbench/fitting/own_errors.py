@@ -21,7 +21,6 @@ import numpy as np
 from workbench.fitting.continued import continued
 from workbench.fitting.errors import at_noise, only_noise, penalised_rmse, white_level
 from workbench.fitting.gauss_newton import Fit, fit_windows
-from workbench.fitting.together import with_worth
 from workbench.fitting.windows import Windows
 
 WEIGHINGS = 2  # the second by what the first leaves
@@ -33,12 +32,6 @@ ROUNDS = 4
 def weighed_anew(fit: Fit, iterations: int = ITERATIONS) -> Fit:
     """The fit followed further with weights from the errors that it leaves."""
     windows = fit.windows.rescaled(fit.residual)
-    return fit_windows(windows, fit.unknowns, fit.point, iterations)
-
-
-def weighed_by_worth(fit: Fit, iterations: int = ITERATIONS) -> Fit:
-    """The same, the windows counted by what they are worth beside the priors."""
-    windows = with_worth(fit, fit.windows.rescaled(fit.residual).worth(1.0))
     return fit_windows(windows, fit.unknowns, fit.point, iterations)
 
 

@@ -9,8 +9,7 @@ from math import inf, isnan, nan
 import numpy as np
 
 from workbench.fitting.gauss_newton import Fit
-from workbench.fitting.linearised import Normal
-from workbench.fitting.together import normal_of, pulls
+from workbench.fitting.linearised import Normal, normal_equations, rescaled
 from workbench.law_range import seen_in
 from workbench.rig import Rig
 from workbench.rig_laws import Ranges, laws_of
@@ -55,7 +54,7 @@ def posterior_deviation(fit: Fit) -> np.ndarray:
     these carry their correlation time.  Where the plant lacks something errors go together over
     many samples and outputs, and windows pull a parameter apart by more than that.  How far tells
 
-        H^-1 (n cov(g_w) + Lambda) H^-1
+        H^-1 (n / (n - 1) sum_w g_w g_w' + Lambda) H^-1
 
     with g_w the gradient of each of the n windows and Lambda the weights of the prior.  What all
     windows have wrong alike neither tells.  One that the fit holds at a bound has none, NaN.
@@ -65,13 +64,27 @@ def posterior_deviation(fit: Fit) -> np.ndarray:
     """
     if not len(fit.unknowns):
         return np.zeros(0)
-    normal, prior = _normal(fit), fit.unknowns.precision
+    normal, known = _normal(fit), curvature_deviation(fit) / fit.unknowns.scale
     inverse = np.linalg.inv(normal.hessian)
-    curvature = np.sqrt(np.maximum(np.diag(inverse), 0.0))
-    most = np.maximum(1.0 / np.sqrt(np.maximum(prior, 1e-300)), curvature)
-    spread = pulls(normal) + np.diag(normal.precision)
-    size = np.clip(np.sqrt(np.diag(inverse @ spread @ inverse)), curvature, most)
-    return np.where(normal.precision > 0.0, size * fit.unknowns.scale, np.nan)
+    most = np.fmax(1.0 / np.sqrt(np.maximum(fit.unknowns.precision, 1e-300)), known)
+    size = np.clip(np.sqrt(np.diag(inverse @ _pulls(normal) @ inverse)), known, most)
+    return size * fit.unknowns.scale
+
+
+def curvature_deviation(fit: Fit) -> np.ndarray:
+    """The first of the two alone, shape (n_p,); NaN for one at a bound."""
+    if not len(fit.unknowns):
+        return np.zeros(0)
+    normal = _normal(fit)
+    variance = np.maximum(np.diag(np.linalg.inv(normal.hessian)), 0.0)
+    return np.where(normal.precision > 0.0, np.sqrt(variance) * fit.unknowns.scale, np.nan)
+
+
+def _pulls(normal: Normal) -> np.ndarray:
+    """Covariance of the gradient, of the windows as they differ and of the prior, (n_p, n_p)."""
+    by_window = np.einsum("wrp,wr->wp", normal.derivatives, normal.residual)
+    n = len(by_window)
+    return n / max(n - 1, 1) * (by_window.T @ by_window) + np.diag(normal.precision)
 
 
 def posterior_covariance(fit: Fit) -> np.ndarray:
@@ -90,7 +103,8 @@ def _normal(fit: Fit) -> Normal:
     Residuals are weighted by the error model of this very fit: the scales that it was fitted with
     may belong to a plant that lacked something and was far worse.
     """
-    return normal_of(fit, fit.windows.rescaled(fit.residual))
+    at = rescaled(fit.derivatives, fit.windows, fit.windows.rescaled(fit.residual))
+    return normal_equations(at, fit.unknowns)
 
 
 def fitted_rig(rig: Rig, fit: Fit, added: Sequence[str] = ()) -> Rig:

@@ -113,7 +113,6 @@ class Windows:
         noise = self.noise[:, None]
         model = error_model(residual * self.scale[:, :, None], self.weight, self.activity, noise)
         plain = replace(self, scale=model.scale(self.activity, noise), errors=model)
-        plain = plain.worth(self.errors.together)
         return plain.capped(residual * (self.scale / plain.scale)[:, :, None])
 
     @cached_property
@@ -137,13 +136,6 @@ class Windows:
         """The same windows with the error shares of others: a held-out recording's yardstick."""
         scale = other.errors.scale(self.activity, self.noise[:, None])
         return replace(self, scale=scale, errors=other.errors)
-
-    def worth(self, together: float) -> Windows:
-        """The same windows, worth so many times less; see :mod:`workbench.fitting.together`."""
-        wider = np.sqrt(together / self.errors.together)
-        return replace(
-            self, scale=wider * self.scale, errors=replace(self.errors, together=together)
-        )
 
     def capped(self, residual: np.ndarray) -> Windows:
         """The same windows, those far worse than typical counting no more than others."""
