@@ -178,6 +178,7 @@ def test_a_setpoint_weight_takes_the_overshoot_from_a_step_and_leaves_its_end():
     assert row.figures["final_error_m"] < 3e-4
 
 
+@pytest.mark.slow
 def test_design_says_that_margins_know_no_dry_friction():
     (text, _) = design_texts(design_report(design("axis-pid", crr_arm()), lambda said: None))
 

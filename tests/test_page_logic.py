@@ -117,6 +117,7 @@ def test_modes_are_gone_once_their_error_is_not_of_the_training_recordings(sessi
     assert with_role(linearised, "validation.csv", Role.TRAINING).linearised is None
 
 
+@pytest.mark.slow
 def test_the_replay_script_gives_the_rig_that_was_saved(session, folder):
     """Compare, fit, go back, fit again, save: the script writes the same rig file."""
     fitted = tasks.fit(
