@@ -15,9 +15,10 @@ from workbench.diagnosis.addition import Addition, accept, assembled
 from workbench.diagnosis.improve import improve
 from workbench.diagnosis.improvement import Improvement
 from workbench.diagnosis.refit import refit, refit_shaken
-from workbench.diagnosis.result import Diagnosis, Size, Verdict
+from workbench.diagnosis.result import Diagnosis, Verdict
 from workbench.diagnosis.rough import rough_fit
 from workbench.diagnosis.scan import scan
+from workbench.diagnosis.size import Size
 from workbench.fitting.problem import posed
 from workbench.rig import Rig
 
@@ -70,7 +71,7 @@ def row_of(task: Task, said: Answer) -> Row:
     own = next((r for r in ranking if r.candidate.name == name and r.fit is not None), None)
     weak = said.diagnosis.verdict is Verdict.RECORDING_TOO_WEAK
     balance = _balance(said.diagnosis)
-    size = next(iter(ranking[0].size.values()), Size(nan, nan))
+    told = next(iter(ranking[0].size.values()), Size(nan, nan))
     return Row(
         kind=task.kind,
         plant=task.plant,
@@ -78,8 +79,8 @@ def row_of(task: Task, said: Answer) -> Row:
         seed=task.seed,
         size=case.size,
         first=said.named,
-        found=size.value,
-        deviation=size.deviation,
+        found=told.value,
+        deviation=told.deviation,
         verdict=said.diagnosis.verdict.value,
         place=said.place,
         tied=said.tied,

@@ -17,9 +17,9 @@ from workbench.diagnosis.judge import share_removed
 from workbench.diagnosis.law import _at_once, _law, better_base, empirical_law, standing, with_terms
 from workbench.diagnosis.law_choice import _Secants, _stable, worth_scanning
 from workbench.diagnosis.refit import refit_from
-from workbench.diagnosis.result import LawTerm, Size, Verdict
+from workbench.diagnosis.result import LawTerm, Verdict
 from workbench.diagnosis.scan import scan_catalogue
-from workbench.diagnosis.size import distinct
+from workbench.diagnosis.size import Size, distinct
 from workbench.effects.law_features import Factor, Here, product, written
 from workbench.fitting.gauss_newton import fit_windows
 from workbench.fitting.linearised import Point

@@ -8,7 +8,7 @@ from scipy.signal import lsim
 
 from tests.linear_plant import DAMPING_N_S_M, MASS_KG, STIFFNESS_N_M, cart
 from workbench.fitting.gauss_newton import fit_windows
-from workbench.fitting.posterior import curvature_deviation, posterior_deviation
+from workbench.fitting.posterior import both_deviations
 from workbench.fitting.unknowns import Unknowns
 from workbench.fitting.windows import cut_windows
 from workbench.recording import Recording
@@ -61,8 +61,7 @@ def test_a_deviation_tells_how_far_fits_of_other_recordings_are_apart(plant, spr
     rng = np.random.default_rng(1)
     fits = [fitted(plant, spread, rng) for _ in range(20)]
     apart = np.std([fit.plant.values[MASS] for fit in fits])
-    told = np.median([posterior_deviation(fit)[0] for fit in fits])
-    curvature = np.median([curvature_deviation(fit)[0] for fit in fits])
+    told, curvature = np.median([both_deviations(fit) for fit in fits], axis=0).ravel()
 
     assert told == pytest.approx(apart, rel=0.4)
     assert spread == 0.0 or curvature < told / 5.0

@@ -18,7 +18,7 @@ from math import nan
 import numpy as np
 
 from workbench.candidate import Candidate
-from workbench.diagnosis.result import Size
+from workbench.diagnosis.size import Size
 from workbench.fitting.linearised import Normal, normal_equations
 from workbench.fitting.problem import Problem
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from math import nan
 
 from workbench.fitting.gauss_newton import Fit
-from workbench.fitting.posterior import curvature_deviation, posterior_deviation
+from workbench.fitting.posterior import both_deviations
 
 DISTINCT = 2.0  # standard deviations
 
@@ -25,7 +25,7 @@ class Size:
 
 def sizes(fit: Fit, names: tuple[str, ...]) -> dict[str, Size]:
     """Values and posterior standard deviations of fitted parameters."""
-    told, curvature = posterior_deviation(fit), curvature_deviation(fit)
+    told, curvature = both_deviations(fit)
     values = fit.unknowns.values(fit.point.t)
     index = {name: k for k, name in enumerate(fit.unknowns.names)}
     return {

@@ -48,36 +48,36 @@ class Moved:
 
 
 def posterior_deviation(fit: Fit) -> np.ndarray:
-    """Standard deviation of each unknown, shape (n_p,), the larger of two; no more than the prior.
+    """Standard deviation of each unknown as it is told, shape (n_p,); see :func:`both_deviations`."""
+    return both_deviations(fit)[0]
 
-    One is that of the curvature of the cost, H^-1, true where errors are as the scales tell them:
-    these carry their correlation time.  Where the plant lacks something errors go together over
-    many samples and outputs, and windows pull a parameter apart by more than that.  How far tells
+
+def both_deviations(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
+    """Standard deviations of the unknowns: those that are told, and the curvature's, each (n_p,).
+
+    The curvature of the cost tells them by H^-1, where errors are as the scales tell them: these
+    carry their correlation time.  Where the plant lacks something errors go together over many
+    samples and outputs, and windows pull a parameter apart by more than that.  How far tells
 
         H^-1 (n / (n - 1) sum_w g_w g_w' + Lambda) H^-1
 
-    with g_w the gradient of each of the n windows and Lambda the weights of the prior.  What all
-    windows have wrong alike neither tells.  One that the fit holds at a bound has none, NaN.
+    with g_w the gradient of each of the n windows and Lambda the weights of the prior.  The larger
+    of the two is told, and no more than the prior.  What all windows have wrong alike neither
+    tells.  One that the fit holds at a bound has none, NaN.
 
     Source: White 1982, "Maximum likelihood estimation of misspecified models"; in groups of errors
     that go together, Liang and Zeger 1986.
     """
+    scale, prior = fit.unknowns.scale, fit.unknowns.precision
     if not len(fit.unknowns):
-        return np.zeros(0)
-    normal, known = _normal(fit), curvature_deviation(fit) / fit.unknowns.scale
-    inverse = np.linalg.inv(normal.hessian)
-    most = np.fmax(1.0 / np.sqrt(np.maximum(fit.unknowns.precision, 1e-300)), known)
-    size = np.clip(np.sqrt(np.diag(inverse @ _pulls(normal) @ inverse)), known, most)
-    return size * fit.unknowns.scale
-
-
-def curvature_deviation(fit: Fit) -> np.ndarray:
-    """The first of the two alone, shape (n_p,); NaN for one at a bound."""
-    if not len(fit.unknowns):
-        return np.zeros(0)
+        return np.zeros(0), np.zeros(0)
     normal = _normal(fit)
-    variance = np.maximum(np.diag(np.linalg.inv(normal.hessian)), 0.0)
-    return np.where(normal.precision > 0.0, np.sqrt(variance) * fit.unknowns.scale, np.nan)
+    inverse = np.linalg.inv(normal.hessian)
+    known = np.sqrt(np.maximum(np.diag(inverse), 0.0))
+    known = np.where(normal.precision > 0.0, known, np.nan)
+    most = np.fmax(1.0 / np.sqrt(np.maximum(prior, 1e-300)), known)
+    told = np.clip(np.sqrt(np.diag(inverse @ _pulls(normal) @ inverse)), known, most)
+    return told * scale, known * scale
 
 
 def _pulls(normal: Normal) -> np.ndarray:
