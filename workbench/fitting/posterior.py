@@ -48,7 +48,7 @@ class Moved:
 
 
 def posterior_deviation(fit: Fit) -> np.ndarray:
-    """Standard deviation of each unknown as it is told, shape (n_p,); see :func:`both_deviations`."""
+    """Standard deviation that is told of each unknown, (n_p,); see :func:`both_deviations`."""
     return both_deviations(fit)[0]
 
 
