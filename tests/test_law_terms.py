@@ -15,7 +15,7 @@ from workbench.diagnosis.addition import NO_LAW, add_law
 from workbench.diagnosis.diagnose import diagnose
 from workbench.diagnosis.judge import share_removed
 from workbench.diagnosis.law import _at_once, _law, better_base, empirical_law, standing, with_terms
-from workbench.diagnosis.law_choice import _Secants, _stable, worth_scanning
+from workbench.diagnosis.law_choice import _plainest, _Secants, _stable_gains, worth_scanning
 from workbench.diagnosis.refit import refit_from
 from workbench.diagnosis.result import LawTerm, Verdict
 from workbench.diagnosis.scan import scan_catalogue
@@ -224,10 +224,10 @@ def test_a_term_of_one_window_is_not_stable_however_much_it_gains():
     once[7, 1] = 1e6
     all_own = np.ones(2, bool)
 
-    assert _stable(secants(everywhere), all_own) == 0
+    assert np.flatnonzero(_stable_gains(secants(everywhere), all_own)) == [0]
     assert secants(once).gains(np.arange(20))[0].argmax() == 1
-    assert _stable(secants(once), all_own) is None
-    assert _stable(secants(everywhere), np.array([False, True])) is None
+    assert not _stable_gains(secants(once), all_own).any()
+    assert not _stable_gains(secants(everywhere), np.array([False, True])).any()
 
 
 def test_two_terms_that_are_all_but_one_share_the_votes():
@@ -236,7 +236,16 @@ def test_two_terms_that_are_all_but_one_share_the_votes():
     alike[1::2] *= (0.9, 1.1)
     alike[0, 1] = 1.5
 
-    assert _stable(secants(alike), np.ones(2, bool)) == 1
+    assert _stable_gains(secants(alike), np.ones(2, bool)).argmax() == 1
+
+
+def test_a_constant_is_told_in_place_of_what_gains_hardly_more_in_the_same_balance():
+    names = ("law[p/p_s]@chamber_b", "law[constant]@chamber_a", "law[constant]@chamber_b")
+    candidates = with_laws(PLANTS["servo_drive"](), names).candidates
+    terms = [candidates[name] for name in names]
+
+    assert _plainest(terms, np.array([1.0, 1.0, 0.96])) == 2
+    assert _plainest(terms, np.array([1.0, 1.0, 0.94])) == 0
 
 
 def test_a_gain_counts_within_the_bounds_of_a_coefficient():

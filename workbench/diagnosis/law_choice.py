@@ -8,8 +8,10 @@ projected out, and with it what an amount a of it would gain,
 
 on any share of the windows.  A term is stable where it gains within a quarter of the most on seven
 in ten of many random halves of the windows; of the stable ones the law takes the one that gains
-most on all.  A term that does the same as an effect of the catalogue is left to that effect: it has
-a name.  Unlike a regression on the smoothed missing term this blurs no coefficient, and it asks all
+most on all, or in its place a constant in the same balance that gains as much but for a twentieth:
+where a pressure stays in its range, a steady flow is like a term in it too, and the simpler one is
+told.  A term that does the same as an effect of the catalogue is left to that effect: it has a
+name.  Unlike a regression on the smoothed missing term this blurs no coefficient, and it asks all
 balances at once.
 
 Source: diagnosis.md 1.9; Meinshausen and Buehlmann 2010 (stability selection).
@@ -28,6 +30,7 @@ from workbench.diagnosis.judge import CLOSE_DROP, SAME_DIRECTION
 from workbench.diagnosis.metric import Metric, every_second
 from workbench.diagnosis.scan import Profile
 from workbench.effect import Parameter
+from workbench.effects.empirical import CONSTANT
 from workbench.fitting.problem import Problem, fuller
 from workbench.fitting.start_states import carried
 
@@ -35,6 +38,7 @@ SECANT = 0.3  # of the typical size
 HALVES = 40
 NEARLY = 1.0 - CLOSE_DROP  # of the most that a term gains on the same windows
 STABLE = 0.7  # of the halves: what one window alone asks for is in half of them
+AS_MUCH = 0.95  # of the gain of another term, by which a constant is told in its place
 SEED = 1
 
 
@@ -91,9 +95,19 @@ def worth_scanning(
     amounts = secants.gains(np.arange(len(windows)))[1]
     signatures = [metric.signature(-a * d)[0] for a, d in zip(amounts, changes, strict=True)]
     named = [_has_a_name(problem, each, known) for each in signatures]
-    best = _stable(secants, ~np.array(named), least / of_all)
+    gains = _stable_gains(secants, ~np.array(named))
     nameless = [term for term, there in zip(terms, named, strict=True) if not there]
-    return [] if best is None else [terms[best]], nameless
+    return [terms[_plainest(terms, gains)]] if gains.max() > least / of_all else [], nameless
+
+
+def _plainest(terms: Sequence[Candidate], gains: np.ndarray) -> int:
+    """Row of the term that gains most, or of a constant in the same balance that gains as much."""
+    best = int(gains.argmax())
+    for row, term in enumerate(terms):
+        alike = (term.place, term.cause.balance) == (terms[best].place, terms[best].cause.balance)
+        if alike and term.cause.drivers == (CONSTANT,) and gains[row] >= AS_MUCH * gains[best]:
+            return row
+    return best
 
 
 def _secant(known: Parameter) -> float:
@@ -130,12 +144,11 @@ def _has_a_name(problem: Problem, signature: np.ndarray, known: Iterable[Profile
     return False
 
 
-def _stable(secants: _Secants, own: np.ndarray, least: float = 0.0) -> int | None:
-    """Row of the term that gains most, above ``least``, of those that are stable and ``own``."""
+def _stable_gains(secants: _Secants, own: np.ndarray) -> np.ndarray:
+    """What each term gains on all windows; 0 for those that are not stable or not ``own``."""
     n = len(secants.grams)
     random, votes = np.random.default_rng(SEED), np.zeros(len(own))
     for _ in range(HALVES):
         gains = secants.gains(random.permutation(n)[: max(n // 2, 1)])[0] * own
         votes += (gains >= NEARLY * gains.max()) & (gains > 0.0)
-    whole = secants.gains(np.arange(n))[0] * own * (votes >= STABLE * HALVES)
-    return int(whole.argmax()) if whole.max() > least else None
+    return secants.gains(np.arange(n))[0] * own * (votes >= STABLE * HALVES)

@@ -26,6 +26,7 @@ from workbench.effect import (
 from workbench.effects.law_features import Feature, Here, product, size_of, written
 
 SOURCE = "diagnosis.md 1.9: sparse law of one balance"
+CONSTANT = "constant"  # the driver of what nothing drives
 ROUND_M, ROUND_M_S = 1e-6, 1e-6  # where |x| and |v| turn smoothly
 
 
@@ -130,7 +131,7 @@ class EmpiricalFlow(Effect):
 class ConstantFlow(EmpiricalFlow):
     """mdot = w."""
 
-    causes = _cause("constant", "constant_kg_s", Balance.MASS)
+    causes = _cause(CONSTANT, "constant_kg_s", Balance.MASS)
     constant_kg_s: Expression = strength(typical=1e-4, lower=-1e-2, upper=1e-2)
 
     def flow_kg_s(self, now: Conditions) -> Expression:
