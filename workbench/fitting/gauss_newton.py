@@ -42,6 +42,8 @@ HALF = 0.5  # of the fall that the quadratic model promises: then a step needs n
 ASTRAY = 4.0  # times its cost: so dear a window gets by start states where it keeps them instead
 AGAIN = 0.02  # fall, in parts of the misfit, above which derivatives are used once more
 CONVERGED = 0.01  # the same, below which a fit has converged
+RESCUE_RUNS = 14  # of the plant, at most, for a step to be rescued
+CHEAP = 1.0 / 3.0  # of the runs that derivatives take: a rescue that costs less is not put off
 NOISE_KNOWN_TO = 0.05  # of its square
 WORTH_IT = 0.003  # of the misfit, for a fit to go on from there
 
@@ -107,21 +109,24 @@ def fit_windows(
     Every step is taken only if the cost falls.  As long as steps bring more than 2 % of the misfit
     beyond noise, the next uses the same derivatives, corrected by what the step showed: they are
     the dear part.  One that brings less with these is made once more with derivatives taken anew,
-    in the same iteration.  Parts of the whole cost would be no measure: most of it is noise that no
-    fit takes away, and effects that differ by less would be compared half fitted.
+    in the same iteration, and is rescued (:func:`_rescued`) with such alone: a rescue is dear too.
+    Of a plant with many states and unknowns it costs a fraction of them, and is tried at once.
+    Parts of the whole cost would be no measure: most of it is noise that no fit takes away, and
+    effects that differ by less would be compared half fitted.
     ``start`` is a point, or what it costs where it was run already.  ``at`` are derivatives to
     begin with, taken near by, with the residual of the start.
     """
     start = start or Point(unknowns.scaled(windows.plant.values), windows.start)
     now = start if isinstance(start, Cost) else points_costs(windows, unknowns, [start]).best
+    cheap = len(unknowns) + len(windows.start) >= RESCUE_RUNS / CHEAP
     fresh, converged, stale = False, False, at is None
     for _ in range(iterations):
         if stale or at is None:
             at, fresh = linearise(windows, unknowns, now.point, now.residual), True
-        now, fall = _advanced(windows, unknowns, at, now, fresh)
+        now, fall = _advanced(windows, unknowns, at, now, fresh or cheap)
         if len(unknowns) and not fresh and fall < AGAIN:
             at, fresh = linearise(windows, unknowns, now.point, now.residual), True
-            now, fall = _advanced(windows, unknowns, at, now, fresh)
+            now, fall = _advanced(windows, unknowns, at, now, rescue=True)
         converged = fresh and fall < CONVERGED
         if converged:
             break
@@ -163,8 +168,7 @@ def _advanced(
 def _stepped(windows: Windows, unknowns: Unknowns, at: Linearised, now: Cost, rescue: bool) -> Cost:
     """The full step where it keeps half of what it promises, else the best of several damped ones.
 
-    Where none brings much, others are tried on request; see :func:`_rescued`.  They cost as much as
-    derivatives, so derivatives that may be the reason are taken anew first.  Start states alone
+    Where none brings much, others are tried on request; see :func:`_rescued`.  Start states alone
     need no others: every window has what suits it best already.
     """
     full, *damped = _damped_steps(at, unknowns)

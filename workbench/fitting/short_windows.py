@@ -5,7 +5,8 @@ priors may end in a valley in which every long window runs past its impacts at t
 Windows of a tenth of the length start anew before that happens, and their cost is smooth; from
 where they lead, windows of about twice the length know more of the parameters.  In two steps, a
 tenth and a third, some gearbox actuators were left well above the noise.  The long windows are
-weighed by what they leave from there, not by what the fit left that is to be bettered.
+weighed by what they leave from there, not by what the fit left that is to be bettered; where they
+leave more than noise, points beside their end are tried as they were beside that of the fit.
 
 Source: multiple shooting, Bock 1983, "Recent advances in parameter identification techniques for
 ODE", whose short intervals widen the valley of the right parameters.
@@ -22,6 +23,7 @@ from workbench.fitting.continued import continued
 from workbench.fitting.errors import only_noise
 from workbench.fitting.own_errors import ITERATIONS, better_of, by_own_errors
 from workbench.fitting.problem import Problem, fitted_twice
+from workbench.fitting.shaken import shaken
 from workbench.fitting.window_length import FEWEST_SAMPLES, moves
 from workbench.fitting.windows import cut_windows
 from workbench.recording import Recording
@@ -42,6 +44,7 @@ def better_from_short_windows(problem: Problem, train: Sequence[Recording]) -> P
     t = _of_short_windows(problem, train)
     tried = fitted_twice(base.windows, base.unknowns, t)
     tried = begun_anew(by_own_errors(continued(tried, ITERATIONS)))
+    tried = tried if only_noise(tried) else shaken(tried, ITERATIONS)
     better = better_of(base, tried)
     return problem if better is base else problem.with_base(better)
 
