@@ -76,9 +76,27 @@ def test_what_leaves_several_times_as_much_on_the_held_out_recording_is_told_apa
     same = {own.candidate.name: own, rival.candidate.name: replace(own, candidate=rival.candidate)}
 
     for held_out, tied in ((0.16, False), (0.90, True)):
-        other = replace(rival, drop_train=0.84, drop_validation=held_out)
+        other = replace(rival, drop_train=0.86, drop_validation=held_out)
         names = [each.candidate for each in tie_group(problem, [leader, other], same)]
         assert (rival.candidate in names) is tied
+
+
+@pytest.mark.parametrize(
+    ("best", "other", "held_out", "tied"),
+    [(1.05, 0.81, 0.61, False), (1.05, 0.81, 0.80, True), (0.97, 0.86, 0.61, True),
+     (0.85, 0.68, 0.61, True)],
+    ids=["only noise and a fifth", "closer held out", "hardly more", "both a good part"],
+)  # fmt: skip
+def test_what_leaves_several_times_as_much_in_training_is_told_apart(
+    problem, followed, sound, best, other, held_out, tied
+):
+    """All are within the quarter of the best that counts as a tie."""
+    leader = replace(sound, drop_train=best, drop_validation=0.73)
+    rival = replace(named(sound, followed, 0), drop_train=other, drop_validation=held_out)
+
+    group = [each.candidate for each in tie_group(problem, [leader, rival], {})]
+
+    assert (rival.candidate in group) is tied
 
 
 def test_a_rival_that_a_few_held_out_windows_refuse_stays_in_the_tie(problem, followed, sound):

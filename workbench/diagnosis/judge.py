@@ -47,8 +47,8 @@ CLOSE_DROP = 0.25  # of the leader's drop: within it the order is not to be trus
 CERTAIN_SHARE = 0.75  # an accepted candidate above it needs no comparison with a law
 CLEARLY_LESS = 0.20  # of the held-out misfit that is left
 CLOSE_DROP_SAME = 0.50  # the same for signatures that are one
-FAR_WORSE = 3.0  # times the held-out misfit that is left: beyond, that recording tells them apart
-LITTLE_LEFT = 0.05  # of the held-out misfit: less is not compared
+FAR_WORSE = 3.0  # times the misfit that is left of a recording: beyond, that one tells them apart
+LITTLE_LEFT = 0.05  # of a misfit: less is not compared
 LEAST_PROXY = 0.05  # of the misfit: less stands for nothing
 
 HELD_OUT_REASON = "does not predict the held-out recording better"
@@ -144,15 +144,15 @@ def tie_group(problem: Problem, refits: list[Refit], profiles: dict[str, Profile
 
     A candidate is tied when its drop comes within a quarter of the best, or within half of it with
     a signature in the same direction: then only the nuisances decide between the two, and on the
-    held-out recording too, unless one leaves several times as much there, or fails to predict it by
-    more than a few of its windows.  Among the tied those that pass every criterion come first,
-    effects before parameters that would lie far off what is known of them, and among these the one
-    leads under which training and held-out recordings together are likeliest: either alone orders
-    rivals by what its few events happen to show.  But where one leaves at least a fifth less of
-    the held-out misfit, and not in a few windows alone, that recording decides.  And where the
-    leader needs more than is usual of one that is always there and leaves hardly less than that
-    one, the other leads.  Those that look most like the leader stand next to it: were it wrong, it
-    would stand for one of them.
+    held-out recording too, unless one leaves several times as much of the misfit of either, as a
+    fifth where the other leaves only noise, or fails to predict by more than a few held-out
+    windows.  Among the tied those that pass every criterion come first, effects before parameters
+    that would lie far off what is known of them, and among these the one leads under which training
+    and held-out recordings together are likeliest: either alone orders rivals by what its few
+    events happen to show.  But where one leaves at least a fifth less of the held-out misfit, and
+    not in a few windows alone, that recording decides.  And where the leader needs more than is
+    usual of one that is always there and leaves hardly less than that one, the other leads.  Those
+    that look most like the leader stand next to it: were it wrong, it would stand for one of them.
 
     Source: diagnosis.md 1.6; Vuong 1989, "Likelihood ratio tests for model selection and non-nested
     hypotheses", for what chance explains.
@@ -179,11 +179,23 @@ def _close(refits: Sequence[Refit], profiles: Mapping[str, Profile]) -> list[Ref
         told_apart = predicts(best) and not predicts(other)
         if told_apart and not (same or _refused_by_few(other, best)):
             continue
-        if left_held_out(other) > FAR_WORSE * max(left_held_out(best), LITTLE_LEFT):
+        if _far_worse(other, best):
             continue
         if gap < (CLOSE_DROP_SAME if same else CLOSE_DROP):
             tied.append(other)
     return tied
+
+
+def _far_worse(other: Refit, best: Refit) -> bool:
+    """True where one recording tells another from the best: it leaves several times as much.
+
+    The training recording does so where the held-out one does not speak for the other.
+    """
+    ours, theirs = (left_held_out(each) for each in (best, other))
+    if theirs > FAR_WORSE * max(ours, LITTLE_LEFT):
+        return True
+    most = FAR_WORSE * max(1.0 - best.drop_train, LITTLE_LEFT)
+    return 1.0 - other.drop_train > most and theirs >= ours
 
 
 def _leader(problem: Problem, effects: Sequence[Refit]) -> Refit:
