@@ -16,6 +16,7 @@ from workbench.fitting.pulled_in import FAR, pulled_in
 from workbench.fitting.resized import resized
 from workbench.fitting.unknowns import WIDE, nominal_unknowns
 
+DELAY = "command_delay@valve_1"
 ADDED = "friction.viscous_n_s_m"  # stands for what was added: it is given no prior
 
 
@@ -89,16 +90,35 @@ def late():
 
 
 @pytest.mark.slow
-def test_a_late_command_that_a_valve_imitated_is_told_with_its_size(late):
-    case, (first, *others) = late
-    (own,) = (row for row in (first, *others) if row.candidate.name == "command_delay@valve_1")
+def test_a_late_command_that_a_valve_imitated_leads(late):
+    first = late[1][0]
 
     assert first.accepted
-    assert own is first or own.candidate.name in first.tied_with
-    assert own.size["command_delay@valve_1.delay_s"].value == pytest.approx(case.size, rel=0.1)
+    assert first.candidate.name == DELAY
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(strict=True, reason="a line's delay does the same and is likelier: 63 in chi2")
-def test_a_late_command_that_a_valve_imitated_leads(late):
-    assert late[1][0].candidate.name == "command_delay@valve_1"
+@pytest.mark.xfail(strict=True, reason="7.0 of 5.7 ms: the pressure sensors lag too, by 1.1 ms")
+def test_a_late_command_that_a_valve_imitated_is_told_with_its_size(late):
+    assert delay_s(late[1]) == pytest.approx(late[0].size, rel=0.1)
+
+
+@pytest.mark.slow
+def test_beside_the_sensors_lags_a_late_command_is_told_with_its_size(late):
+    """A line's delay does the same to a switched valve, and may lead."""
+    lags = [f"sensor_lag@{chamber}.pressure" for chamber in ("chamber_1", "chamber_2")]
+    rig = GEARBOX.user_rig(late[0])
+    plant = rig.plant.with_values({f"{lag}.time_constant_s": 1.1e-3 for lag in lags})
+    (recorded,) = recordings([late[0]])
+    ranking = answer(late[0], *recorded, rig.with_added(plant, lags)).diagnosis.ranking
+    first = ranking[0]
+
+    assert first.accepted
+    assert DELAY in (first.candidate.name, *first.tied_with)
+    assert delay_s(ranking) == pytest.approx(late[0].size, rel=0.1)
+
+
+def delay_s(ranking):
+    """The size of the delay in a ranking."""
+    (own,) = (row for row in ranking if row.candidate.name == DELAY)
+    return own.size[f"{DELAY}.delay_s"].value
