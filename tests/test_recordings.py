@@ -7,7 +7,7 @@ import h5py
 import numpy as np
 import pytest
 import scipy.io
-from recording_files import FACTORS, FULL, NAMES, RIG, N, read, refused, table, text
+from recording_files import FACTORS, FULL, NAMES, RIG, N, read, table, text
 
 from workbench.differentiator import derivative
 from workbench.errors import InputError
@@ -109,60 +109,6 @@ def test_a_matlab_object_is_refused_with_the_way_out(tmp_path):
 
     with pytest.raises(InputError, match=r"s = struct\('t', ts.Time, 'y', ts.Data\)"):
         read_recording(load_rig(RIG), path)
-
-
-def test_jitter_is_interpolated_onto_an_even_grid(tmp_path):
-    t = 1e-3 * np.arange(N) + 2e-4 * np.random.default_rng(1).uniform(-1, 1, N)
-    rows = np.column_stack([t, 5 + np.sin(9 * t), 5 + np.cos(9 * t), 140 + 90 * np.sin(5 * t)])
-
-    recording = read(tmp_path, text(rows))
-
-    even = t[0] + recording.time_s
-    assert recording.sample_time_s == pytest.approx(1e-3, rel=1e-2)
-    assert recording["valve.command_v"] == pytest.approx(5 + np.sin(9 * even), abs=1e-4)
-
-
-@pytest.mark.parametrize("round_to", [np.round, np.floor])
-@pytest.mark.parametrize("rate_hz", [300.0, 700.0, 128.0])
-def test_an_even_clock_with_rounded_stamps_keeps_its_samples(tmp_path, rate_hz, round_to):
-    """Stamps in ms of a clock of 300 Hz say that it is uneven by 0.15 of a sample; it is not."""
-    rows = table()
-    rows[:, 0] = 1e-3 * round_to(1e3 * np.arange(N) / rate_hz + 0.21)
-    found = read(tmp_path, text(rows))
-
-    assert found.sample_time_s == pytest.approx(1.0 / rate_hz, rel=1e-4)
-    for name, column, factor in zip(FULL, rows.T[1:], FACTORS, strict=True):
-        assert found[name] == pytest.approx(factor * column, rel=1e-7)
-
-
-def test_rounded_stamps_of_an_uneven_clock_are_interpolated(tmp_path):
-    """Stamps that lie further off an even grid than half their resolution tell a real jitter."""
-    t = 0.01 * np.arange(N) + 2e-3 * np.random.default_rng(1).uniform(-1, 1, N)
-    t = np.round(t - t[0], 3)
-    rows = np.column_stack([t, 5 + np.sin(t), 5 + np.cos(t), 140 + 90 * np.sin(t)])
-
-    recording = read(tmp_path, text(rows))
-
-    assert recording["valve.command_v"] == pytest.approx(5 + np.sin(recording.time_s), abs=1e-4)
-
-
-def test_a_recording_is_resampled_when_asked(tmp_path):
-    recording = read(tmp_path, text(table()), 'resample = "4 ms"')
-
-    assert (recording.sample_time_s, len(recording)) == (4e-3, N // 4)
-
-
-def test_gaps_are_refused_with_their_place_or_split(tmp_path):
-    rows = table()
-    rows[200:, 0] += 2.0
-
-    said = refused(tmp_path, text(rows))
-    split = read(tmp_path, text(rows), 'gaps = "split"')
-
-    assert "1 gap in the time, the longest 2.001 s after line 201" in said
-    assert 'gaps = "split"' in said
-    assert split.starts == (0, 200)
-    assert [len(piece) for piece in split.pieces] == [200, 200]
 
 
 def test_missing_samples_of_an_output_stay_missing(tmp_path):

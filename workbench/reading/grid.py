@@ -44,7 +44,11 @@ class Grid:
         return tuple(int(n) for n in np.cumsum([0, *lengths[:-1]]))
 
     def on(self, values: np.ndarray) -> np.ndarray:
-        """A channel on the grid, shape (n,): between samples a line; on/off signals are held."""
+        """A channel on the grid, shape (n,): between samples a line; on/off signals are held.
+
+        A sensor slower than the clock has no value in most rows.  Its samples go to the points of
+        the grid next to them, on the line between them; no others are made up.
+        """
         if self.grids_s is None:
             return np.concatenate([values[piece] for piece in self.pieces])
         finite = values[np.isfinite(values)]
@@ -52,7 +56,7 @@ class Grid:
         place = _held if switched else np.interp
         return np.concatenate(
             [
-                place(grid, self.time_s[piece], values[piece])
+                _placed(place, grid, self.time_s[piece], values[piece], self.sample_time_s)
                 for grid, piece in zip(self.grids_s, self.pieces, strict=True)
             ]
         )
@@ -171,6 +175,25 @@ def _tidy(step: float, n: int) -> float:
 
 def _points(t: np.ndarray, step: float) -> np.ndarray:
     return t[0] + step * np.arange(int((t[-1] - t[0]) / step + EXACT) + 1)
+
+
+def _placed(
+    place: Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray],
+    grid: np.ndarray,
+    time_s: np.ndarray,
+    values: np.ndarray,
+    step: float,
+) -> np.ndarray:
+    """Values on the grid: between samples in neighbouring rows, and within half a step of one."""
+    there = np.isfinite(values)
+    if there.all() or not there.any():
+        return place(grid, time_s, values)
+    sampled_s = time_s[there]
+    after = np.clip(np.searchsorted(sampled_s, grid), 1, max(len(sampled_s) - 1, 1))
+    ends = sampled_s[[after - 1, np.minimum(after, len(sampled_s) - 1)]]
+    near = np.abs(grid - ends).min(axis=0) <= 0.5 * step
+    between = np.isfinite(place(grid, time_s, values))
+    return np.where(near | between, place(grid, sampled_s, values[there]), np.nan)
 
 
 def _held(grid: np.ndarray, time_s: np.ndarray, values: np.ndarray) -> np.ndarray:
