@@ -14,7 +14,7 @@ import numpy as np
 
 from studies.text import percent, shown
 from workbench.comparison.course import course_of
-from workbench.consistency import examined
+from workbench.consistency import examined, in_common
 from workbench.consistency.findings import Weight
 from workbench.fitting.identifiability import identifiability
 from workbench.reading.formats import table_of
@@ -128,7 +128,9 @@ def gate_of(rig: Rig, train: Sequence[Recording]) -> tuple[Finding, ...]:
             found.append(Finding("fits the rig", str(each), mark))
     if not any(each.what == "fits the rig" for each in found):
         found.append(Finding("fits the rig", "no recording contradicts it"))
-    known = identifiability(rig, train)
+    alike, left_out = in_common(rig.plant, train)
+    found += (Finding("fits the rig", str(each), Mark.LOOK) for each in left_out)
+    known = identifiability(rig, alike)
     informed = len(known.names) - len(known.flat)
     seen = f"{informed} of {len(known.names)} uncertain parameters; rank {known.rank}"
     if known.flat:

@@ -19,6 +19,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from workbench.consistency.common_channels import in_common
 from workbench.consistency.explained import Probe, moving, probe, unexplained
 from workbench.consistency.findings import Finding, Weight
 from workbench.consistency.misreadings import Misreading, misreadings
@@ -51,20 +52,22 @@ Set = tuple[Recording, ...]
 def trusted(rig: Rig, *sets: Sequence[Recording]) -> tuple[tuple[Set, ...], tuple[Finding, ...]]:
     """The sets of recordings without the samples of stuck sensors, and what is doubtful in them.
 
+    All keep the outputs and optional inputs that every one of them carries.
+
     Raises
     ------
     InputError
-        With everything that forbids any conclusion.
+        With everything that forbids any conclusion, or if no output is in all of them.
     """
-    found: dict[int, tuple[Recording, list[Finding]]] = {}
-    for each in (recording for group in sets for recording in group):
-        if id(each) not in found:
-            found[id(each)] = _examined(rig, each)
-    findings = tuple(finding for _, own in found.values() for finding in own)
+    once = {id(each): each for group in sets for each in group}
+    found = {key: _examined(rig, each) for key, each in once.items()}
+    findings = [finding for _, own in found.values() for finding in own]
     refused = [finding.message for finding in findings if finding.weight is Weight.REFUSED]
     if refused:
         raise InputError(*refused)
-    return tuple(tuple(found[id(each)][0] for each in group) for group in sets), findings
+    alike, left_out = in_common(rig.plant, [kept for kept, _ in found.values()])
+    kept = dict(zip(found, alike, strict=True))
+    return tuple(tuple(kept[id(each)] for each in group) for group in sets), (*findings, *left_out)
 
 
 def checked(rig: Rig, *sets: Sequence[Recording]) -> tuple[Set, ...]:
