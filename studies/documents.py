@@ -104,6 +104,7 @@ def diagnosis_document(found: Diagnosis, unit_of: Mapping[str, str]) -> Document
         "at": named.candidate.place if named else None,
         "together_with": _partner(named.candidate) if named else None,
         "sentence": found.sentence,
+        "contradicted": found.contradicted,
         "ranking": [_ranked(row) for row in found.ranking],
         "where": _where(found.where) if found.where else None,
         "law": law_document(found.law) if found.law else None,

@@ -36,7 +36,7 @@ def ranking_text(found: Diagnosis) -> str:
             percent(row.compensable),
             sizes_text(row),
             row.decided_by.value,
-            _remark(row, found.ranking[0]),
+            _remark(row, found),
         )
         for place, row in enumerate(found.ranking[:SHOWN_RANKS], start=1)
     ]
@@ -52,12 +52,17 @@ def sizes_text(row: Ranked) -> str:
     return ", ".join(sizes) or "-"
 
 
-def _remark(row: Ranked, leader: Ranked) -> str:
+def _remark(row: Ranked, found: Diagnosis) -> str:
     """What speaks for or against a candidate; passing alone makes it no second cause."""
+    leader = found.ranking[0]
     if not row.accepted:
         return "; ".join((*reasons(row), *([_blind_text(row)] if row.blind else [])))
     if row is not leader and row.candidate.name not in leader.alike:
         return f"would pass, but {leader.candidate.name} explains more"
+    if found.law:
+        return "would pass, but the law explains clearly more"
+    if found.contradicted:
+        return "passes, but recording and rig contradict each other"
     return f"accepted, tied with {', '.join(row.tied_with)}" if row.tied_with else "accepted"
 
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from test_diagnosis import bench, nothing
 
-from workbench.diagnosis import addition
 from workbench.diagnosis import diagnose as diagnosing
-from workbench.diagnosis.addition import NO_LAW, add_law
+from workbench.diagnosis import law_addition
 from workbench.diagnosis.diagnose import diagnose
 from workbench.diagnosis.judge import share_removed
 from workbench.diagnosis.law import _at_once, _law, better_base, empirical_law, standing, with_terms
+from workbench.diagnosis.law_addition import NO_LAW, add_law
 from workbench.diagnosis.law_choice import worth_scanning
 from workbench.diagnosis.refit import refit_from
 from workbench.diagnosis.result import LawTerm, Verdict
@@ -153,7 +153,7 @@ def test_a_law_gets_no_credit_for_a_prior_fit_that_stopped_early(monkeypatch):
 
     early = stopped_early(posed(nothing_missing))
     law = law_with(early, SINE)
-    asked_first_at(monkeypatch, addition, early, law)
+    asked_first_at(monkeypatch, law_addition, early, law)
 
     assert share_removed(law) > 0.9
     assert better_base(early, law).base.cost < early.base.cost - 0.9 * early.misfit
@@ -165,7 +165,7 @@ def test_a_law_gets_no_credit_for_a_prior_fit_that_stopped_early(monkeypatch):
 def test_a_law_that_is_there_counts_from_the_better_prior_fit_that_it_found(monkeypatch):
     problem = posed(wavy)
     early = stopped_early(problem, 15.0)
-    asked = asked_first_at(monkeypatch, addition, early, law_with(early, SINE))
+    asked = asked_first_at(monkeypatch, law_addition, early, law_with(early, SINE))
     law = law_of(problem)
     (step,) = add_law(load_rig(BARE), *recorded(wavy))
     first, then = (each.base.cost for each in asked)

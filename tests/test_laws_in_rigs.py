@@ -16,10 +16,11 @@ from studies.improvement_text import improvement_text
 from studies.text_of_results import unit_names
 from workbench.comparison import compare
 from workbench.comparison.run import run
-from workbench.diagnosis.addition import add, add_law
+from workbench.diagnosis.addition import add
 from workbench.diagnosis.diagnose import diagnose
 from workbench.diagnosis.improve import improve
 from workbench.diagnosis.improvement import Change
+from workbench.diagnosis.law_addition import add_law
 from workbench.diagnosis.result import Verdict
 from workbench.errors import InputError
 from workbench.fitting.fit import fit

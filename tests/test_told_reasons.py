@@ -8,7 +8,7 @@ from test_report import LAG, LEAK, UNITS, diagnosis, ranked
 
 from studies.documents import diagnosis_document
 from studies.improvement_text import _taken_instead
-from studies.text_of_ranking import reasons
+from studies.text_of_ranking import ranking_text, reasons
 from studies.text_of_results import diagnosis_text, moved_text
 from workbench.diagnosis.judge import HELD_OUT_REASON, SHARE_REASON
 from workbench.diagnosis.result import Verdict
@@ -144,6 +144,16 @@ def test_what_passes_alone_beside_what_explains_more_is_not_told_to_be_missing()
 
     assert text.count("accepted") == 1
     assert f"would pass, but {LEAK.name} explains more" in text
+
+
+def test_what_passes_beside_a_law_or_a_contradiction_is_not_told_as_accepted():
+    """It stood there as ``accepted`` below "nothing in the catalogue"."""
+    outlawed = ranking_text(diagnosis(Verdict.NOT_IN_CATALOGUE, law=object()))
+    withdrawn = ranking_text(replace(diagnosis(), contradicted=True))
+
+    assert "would pass, but the law explains clearly more" in outlawed
+    assert "passes, but recording and rig contradict each other" in withdrawn
+    assert "accepted" not in outlawed + withdrawn
 
 
 def test_an_effect_that_comes_in_before_a_law_is_told_beside_the_law():

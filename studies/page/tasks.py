@@ -151,7 +151,8 @@ def add(
     """The verb."""
     enough_samples(rig, train)
     found = workbench.add(rig, name, train, validation, say)
-    text = addition_text(found, unit_names(rig.plant.measured))
+    told = addition_text(found, unit_names(rig.plant.measured))
+    text = f"{found.rig.notes[-1]}\n{told}"
     return Accepted(name, found.rig, found.before, found.after, found.parameters, text)
 
 

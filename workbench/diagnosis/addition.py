@@ -11,14 +11,14 @@ from workbench.consistency import checked
 from workbench.diagnosis.absent import is_new, require_place
 from workbench.diagnosis.diagnose import Progress, silent
 from workbench.diagnosis.evidence import WARNINGS, Recordings, held_out, weighed
-from workbench.diagnosis.law import better_base, empirical_law, plant_with_terms, standing
+from workbench.diagnosis.judge import reasons_against
+from workbench.diagnosis.law import plant_with_terms
 from workbench.diagnosis.pairs import pair_fit
 from workbench.diagnosis.refit import Refit, refit, refit_shaken
-from workbench.diagnosis.result import Diagnosis, Evidence, Law, Ranked, told
+from workbench.diagnosis.result import Diagnosis, Evidence, Ranked, told
 from workbench.diagnosis.rough import rough_fit
-from workbench.diagnosis.scan import scan, scan_catalogue
+from workbench.diagnosis.scan import scan
 from workbench.diagnosis.settle import settled_leader
-from workbench.diagnosis.where import locate
 from workbench.fitting.errors import Errors, errors_of
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.posterior import (
@@ -34,14 +34,13 @@ from workbench.recording import Recording
 from workbench.rig import Rig
 from workbench.rig_laws import is_law
 
-NO_LAW = "no empirical law of up to three terms passes every criterion"
-
 
 @dataclass(frozen=True)
 class Addition:
     """One effect added and fitted: the new rig, errors before and after, parameters.
 
-    ``evidence`` says what its errors on held-out recordings are worth.
+    ``evidence`` says what its errors on held-out recordings are worth, ``against`` which criteria
+    of acceptance it fails: whoever adds an effect by name may know more than the recordings.
     """
 
     rig: Rig
@@ -54,6 +53,7 @@ class Addition:
     fit: Fit = field(repr=False)
     validation_fit: Fit | None = field(repr=False)
     evidence: Evidence = Evidence.VALIDATION
+    against: tuple[str, ...] = ()
 
 
 def add(
@@ -73,7 +73,7 @@ def add(
         If the effect is there already, only a shift of a parameter that is fitted anyway, fixed by
         the rig, or a change of something that the plant lacks; or if there are more than two.
     """
-    train, validation, evidence = _with_held_out(rig, train, validation)
+    train, validation, evidence = with_held_out(rig, train, validation)
     if is_law(name):
         rig = replace(rig, plant=plant_with_terms(rig.plant, train, [name]))
     plant = rig.fit_for(train[0])
@@ -88,7 +88,18 @@ def add(
     profiles = scan(problem.whole, base.windows, base.unknowns, base.point, candidates)
     begun = rough_fit(problem, profiles[0]) if len(names) == 1 else pair_fit(problem, profiles)
     found = refit_shaken(problem, refit(problem, begun))
-    return refitted_addition(rig, problem, found, weighed(evidence, problem.base_validation))
+    evidence = weighed(evidence, problem.base_validation)
+    step = refitted_addition(rig, problem, found, evidence)
+    return with_objections(step, reasons_against(problem.base, found))
+
+
+def with_objections(step: Addition, against: tuple[str, ...]) -> Addition:
+    """The addition with the criteria that it fails, in its note too."""
+    if not against:
+        return step
+    *before, last = step.rig.notes
+    told = f"{last}; added by name, a diagnosis would refuse it: {', '.join(against)}"
+    return replace(step, rig=replace(step.rig, notes=(*before, told)), against=against)
 
 
 def refitted_addition(rig: Rig, problem: Problem, found: Refit, evidence: Evidence) -> Addition:
@@ -118,37 +129,7 @@ def _require_absent(rig: Rig, plant: Plant, problem: Problem, candidate: Candida
         raise ValueError(f"{name}: {rig.name} fixes {candidate.strength}: nothing to fit")
 
 
-def add_law(
-    rig: Rig,
-    train: Sequence[Recording],
-    validation: Sequence[Recording] = (),
-    progress: Progress = silent,
-) -> tuple[Addition, ...]:
-    """Add the empirical law of up to three terms that explains most, term by term.
-
-    Raises
-    ------
-    ValueError
-        If none passes the criteria that an effect must pass.
-    """
-    train, validation, evidence = _with_held_out(rig, train, validation)
-    problem = pose(rig, train, validation, believed=BELIEVED, progress=progress)
-    progress("empirical law")
-    where = locate(problem, train)
-    law = empirical_law(problem, scan_catalogue(problem), where=where)
-    better = better_base(problem, law)
-    if better:
-        progress("the prior fit is improved by what the law found: once more")
-        problem = better
-        law = empirical_law(problem, scan_catalogue(problem), where=where)
-        law = standing(problem, law)
-    if law is None:
-        raise ValueError(f"{rig.name}: {NO_LAW}")
-    evidence = weighed(evidence, problem.base_validation)
-    return accept_law(rig, law, errors_of(problem.base, problem.base_validation), evidence)
-
-
-def _with_held_out(
+def with_held_out(
     rig: Rig, train: Recordings, validation: Recordings
 ) -> tuple[Recordings, Recordings, Evidence]:
     """As :func:`held_out` of recordings that fit the rig; warns where they prove little."""
@@ -199,25 +180,6 @@ def apart(step: Addition) -> tuple[Addition, ...]:
         before.append(f"{one.name}, together with {other.name}{said}")
         halves.append(replace(step, candidate=one, rig=replace(step.rig, notes=tuple(before))))
     return tuple(halves)
-
-
-def accept_law(
-    rig: Rig, law: Law, before: Errors, evidence: Evidence = Evidence.VALIDATION
-) -> tuple[Addition, ...]:
-    """The terms of an empirical law added to the rig one after the other, as they were fitted.
-
-    ``before`` are the errors without any of them.
-    """
-    steps: list[Addition] = []
-    for term in law.steps:
-        name, recordings = term.candidate.name, term.fit.windows.recordings
-        rig = replace(rig, plant=plant_with_terms(rig.plant, recordings, [name]))
-        drops = (term.drop_train, term.drop_validation)
-        step = addition(rig, before, term.candidate, term.fit, term.validation, drops, evidence)
-        steps.append(step)
-        rig = replace(freed(rig, step), notes=step.rig.notes)
-        before = step.after
-    return tuple(steps)
 
 
 def _present(problem: Problem, candidate: Candidate) -> bool:

@@ -17,16 +17,10 @@ from math import inf
 from workbench.comparison.free_run import free_run_errors
 from workbench.consistency import checked
 from workbench.diagnosis.absent import unknown_forms
-from workbench.diagnosis.addition import (
-    Addition,
-    accept,
-    accept_law,
-    add,
-    add_law,
-    assembled,
-)
+from workbench.diagnosis.addition import Addition, accept, add, assembled
 from workbench.diagnosis.diagnose import Progress, diagnose, silent
 from workbench.diagnosis.improvement import Change, Improvement
+from workbench.diagnosis.law_addition import accept_law, add_law
 from workbench.diagnosis.passes import Kept, Passes
 from workbench.diagnosis.rounds import Rounds, forward
 from workbench.fitting.errors import Errors, errors_of, per_sample
