@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from studies.documents import Document, errors, law_document, moved_document
+from studies.documents import Document, diagnosis_document, errors, law_document, moved_document
 from studies.plain import plain
 from studies.text import columns, number, removed
 from studies.text_of_results import errors_over, law_text, moved_text, windows_text
@@ -128,6 +128,9 @@ def improvement_document(found: Improvement, unit_of: Mapping[str, str]) -> Docu
             for stage in found.budget
         ],
         "diagnoses": [each.sentence for each in found.diagnoses],
+        "last_diagnosis": (
+            diagnosis_document(found.diagnoses[-1], unit_of) if found.diagnoses else None
+        ),
         "ahead": [each.sentence for each in found.ahead],
         "warnings": list(found.warnings),
         "removals": [

@@ -28,6 +28,7 @@ ADD = (
     "--validate validation.csv -o rig2.toml"
 )
 IMPROVE = "workbench improve rig.toml train.csv --validate validation.csv -o rig2.toml"
+PLAYABLE = "with --figures DIR: its commands as a CSV, and what each rival would record as a figure"
 LAW = "law"  # in place of an effect: the empirical law that explains most
 FIT = "workbench fit rig.toml train.csv --validate validation.csv -o rig2.toml"
 
@@ -67,6 +68,8 @@ def diagnose(
             save_next_recording(known, found.next_recording, figures, command_text())
             say(f"figures in {figures}")
         typer.echo(diagnosis_text(found, units))
+        if not figures and found.next_recording and found.next_recording.predicted:
+            typer.echo(PLAYABLE)
 
 
 @app.command(cls=Spread, epilog=example(ADD))

@@ -5,11 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from studies.export import save_next_recording
 from studies.figures.diagnosis import diagnosis_figures
 from studies.figures.improvement import budget_figure, errors_figure
 from studies.figures.style import save_all
 from studies.improvement_text import free_states, improvement_text, window_states
 from studies.report.page import FIGURES, Section, write_report
+from studies.text_of_next_recording import instructions
 from studies.text_of_results import (
     addition_text,
     diagnosis_text,
@@ -34,8 +36,19 @@ def report_improvement(found: Improvement, folder: Path, command: str) -> Path:
         text = diagnosis_text(diagnosis, units)
         sections.append(Section(f"Diagnosis {number}", (diagnosis.sentence,), text, (*drawn,)))
         figures |= drawn
+    sections += _next_recording(found, folder, command)
     for number, step in enumerate(found.steps, start=1):
         title = f"Addition {number}: {step.candidate.name}"
         sections.append(Section(title, step.rig.notes[-1:], addition_text(step, units)))
     save_all(figures, folder / FIGURES, command)
     return write_report(folder, f"Improvement of {found.rig.name}", command, sections)
+
+
+def _next_recording(found: Improvement, folder: Path, command: str) -> list[Section]:
+    """What the last diagnosis asks for: predictions, and the commands to play beside them."""
+    asked = found.diagnoses[-1].next_recording if found.diagnoses else None
+    if asked is None or not asked.predicted:
+        return []
+    save_next_recording(found.rig, asked, folder / FIGURES, command)
+    notes = (f"{FIGURES}/next_recording.csv holds the commands, ready to play",)
+    return [Section("Next recording", notes, instructions(asked), ("next_recording",))]
