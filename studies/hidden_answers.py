@@ -40,7 +40,7 @@ def answered(task: Task, recorded: Recorded) -> Row:
             said = beyond_differences(said, rig, recorded)
         row = row_of(task, said)
         if task.kind is Kind.EFFECT and isnan(row.own_drop):
-            row = replace(row, own_drop=own_drop(said, rig, recorded))
+            row = replace(row, own_drop=own_drop(said, rig))
     return replace(row, seconds=monotonic() - begun)
 
 
@@ -92,15 +92,14 @@ def row_of(task: Task, said: Answer) -> Row:
     )
 
 
-def own_drop(said: Answer, rig: Rig, recorded: Recorded) -> float:
+def own_drop(said: Answer, rig: Rig) -> float:
     """Share of the misfit that the hidden effect removes, where the diagnosis did not refit it.
 
     What no recording shows is not refitted, but neither is what stands behind many that do the
     same: only its own refit tells whether it can be seen.
     """
-    train, _ = recorded
     base, name = said.diagnosis.base, bench_of(said.case).public_name(said.case)
-    problem = posed(rig, [train], base, said.diagnosis.base_validation)
+    problem = posed(rig, base, said.diagnosis.base_validation)
     candidates = [c for c in problem.whole.candidates.values() if c.name == name]
     profiles = scan(
         problem.whole, base.windows, base.unknowns, base.point, candidates, base.derivatives

@@ -219,4 +219,4 @@ def test_whether_a_hidden_effect_can_be_seen_does_not_hang_on_whether_it_was_ref
     refitted = row_of(Task(Kind.EFFECT, (case,)), said).own_drop
 
     assert refitted > 0.5
-    assert own_drop(said, bench.user_rig(case), recorded) == pytest.approx(refitted, rel=0.05)
+    assert own_drop(said, bench.user_rig(case)) == pytest.approx(refitted, rel=0.05)

@@ -44,8 +44,11 @@ def scales(
 
 def _moved(body: str, recordings: Sequence[Recording]) -> dict[str, float]:
     """Middle and length of the recorded stroke of a body, and its largest speed."""
-    places = [r.channels[f"{body}.position_m"] for r in recordings
-              if f"{body}.position_m" in r.channels]  # fmt: skip
+    places = [
+        r.channels[name]
+        for r in recordings
+        if (name := f"{body}.position_m") in r.channels and np.isfinite(r.channels[name]).any()
+    ]
     speeds = [s for r in recordings if (s := recorded_speed(r, body)) is not None]
     found = {}
     if places:
@@ -58,10 +61,14 @@ def _moved(body: str, recordings: Sequence[Recording]) -> dict[str, float]:
 
 
 def _pressed(across: Sequence[str], recordings: Sequence[Recording]) -> dict[str, float]:
-    """Largest recorded pressure, or difference of two that are both recorded."""
+    """Largest recorded pressure, or difference of two that are both recorded.
+
+    Two sensors that are never read at once differ by what lies between their samples.
+    """
     names = [f"{part}.pressure_pa" for part in across]
-    recorded = [[r.channels[n] for n in names if n in r.channels] for r in recordings]
+    recorded = [
+        [bridged(r.channels[n], r.starts) for n in names if n in r.channels] for r in recordings
+    ]
     rows = [each[0] - each[1] if len(each) > 1 else each[0] for each in recorded if each]
-    if not rows:
-        return {}
-    return {"pressure_pa": max(max(float(np.nanmax(np.abs(row))) for row in rows), 1.0)}
+    largest = [float(np.nanmax(np.abs(row))) for row in rows if np.isfinite(row).any()]
+    return {"pressure_pa": max(*largest, 1.0)} if largest else {}

@@ -85,7 +85,8 @@ def add(
         _require_absent(rig, plant, problem, candidate)
     progress(f"refit with {name}")
     base = problem.base
-    profiles = scan(problem.whole, base.windows, base.unknowns, base.point, candidates)
+    at = base.windows, base.unknowns, base.point
+    profiles = scan(problem.whole, *at, candidates, fixed=rig.fixed)
     begun = rough_fit(problem, profiles[0]) if len(names) == 1 else pair_fit(problem, profiles)
     found = refit_shaken(problem, refit(problem, begun))
     evidence = weighed(evidence, problem.base_validation)

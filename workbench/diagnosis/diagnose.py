@@ -97,11 +97,11 @@ def diagnose(
     evidence = weighed(evidence, problem.base_validation)
     if not evidence.strong:
         warnings += (WARNINGS[evidence],)
-    if not problem.base.converged:
-        warnings += ("the prior fit did not converge: the ranking is provisional",)
     progress("where it fails")
     where, begun = locate(problem, train), problem.base
     found = _asked_at_best(problem, where, progress)
+    if not found.problem.base.converged:
+        warnings += ("the prior fit did not converge: the ranking is provisional",)
     if where and found.problem.base is not begun:
         where = replace(where, by_regime=regime_shares(found.problem.base))
     told = _concluded(rig.name, found, where, evidence, progress)

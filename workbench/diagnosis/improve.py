@@ -61,13 +61,14 @@ def improve(
         raise ValueError("improve needs a validation recording: another manoeuvre, held out")
     if proves_nothing(train, validation):
         raise ValueError(f"{NO_EVIDENCE}; expected another manoeuvre")
-    train, validation = checked(rig, train, validation)
+    kept = checked(rig, train, validation)
     done = forward(Rounds(rig), train, validation, progress)
-    for proceed in (_thought_over, _with_law) if law else (_thought_over,):
-        if not done.stopped:
-            done = proceed(done, train, validation, progress)
+    if not done.stopped:
+        done = _thought_over(done, *kept, progress)
+    if law and not done.stopped:
+        done = _with_law(done, train, validation, progress)
     progress("free runs")
-    return _improvement(done, train, validation)
+    return _improvement(done, *kept)
 
 
 def _thought_over(
@@ -158,7 +159,8 @@ def _improvement(
             done = done.marked("all of it", fit, held_out, Change.FITTED)
         final = fitted_rig(assembled(done.rig, done.kept.steps), fit)
     if final is not done.rig:
-        added = unknown_forms(done.rig, (step.candidate for step in done.steps))
+        steps = (*done.steps, *(done.kept.steps if done.kept else ()))  # rivals that came in too
+        added = unknown_forms(done.rig, (step.candidate for step in steps))
         parameters = tuple(_counted_from(done.rig, added, row) for row in moved_parameters(fit))
     sets, windows = {"train": train, "validation": validation}, fit.windows
     noise = dict(zip(windows.plant.measured, windows.noise.tolist(), strict=True))

@@ -170,7 +170,7 @@ def tie_group(problem: Problem, refits: list[Refit], profiles: dict[str, Profile
 
 
 def _close(refits: Sequence[Refit], profiles: Mapping[str, Profile]) -> list[Refit]:
-    """The best in training, which is the first, and those that cannot be told from it."""
+    """The first, the best in training of what is sound, and those that cannot be told from it."""
     best, *others = refits
     tied = [best]
     for other in others:

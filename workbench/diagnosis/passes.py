@@ -236,9 +236,8 @@ def _refitted(problem: Problem, candidate: Candidate) -> Refit | None:
         return None
     if candidate.held in base.unknowns.names:
         return _shifted(problem, candidate)
-    profiles = scan(
-        problem.whole, base.windows, base.unknowns, base.point, [candidate], base.derivatives
-    )
+    at = base.windows, base.unknowns, base.point
+    profiles = scan(problem.whole, *at, [candidate], base.derivatives, problem.rig.fixed)
     if not profiles:
         return None
     return refit_shaken(problem, refit(problem, rough_fit(problem, profiles[0])))

@@ -22,6 +22,7 @@ from workbench.diagnosis.shifts import LEAVES_PRIOR, Shift
 from workbench.effect import Kind
 from workbench.fitting.problem import Problem
 from workbench.rig_laws import is_law
+from workbench.units import public_name
 
 
 def ranked(
@@ -103,6 +104,8 @@ def _reason_not_asked(problem: Problem, candidate: Candidate) -> str:
         return f"nothing without {candidate.member}.{candidate.cause.needs}"
     if (candidate.held or candidate.strength) in problem.rig.fixed:
         return "not applicable: fixed by the rig"
+    if candidate.held and candidate.held not in problem.base.unknowns.names:
+        return f"not applicable: {public_name(candidate.held)} has no uncertainty"
     return "there already"
 
 

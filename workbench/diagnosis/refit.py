@@ -12,7 +12,7 @@ from math import nan
 import numpy as np
 
 from workbench.candidate import Candidate
-from workbench.diagnosis.rough import KEPT, Rough, windows_for
+from workbench.diagnosis.rough import KEPT, Rough, windows_for, with_shape
 from workbench.diagnosis.scan import Profile
 from workbench.diagnosis.shifts import Shift
 from workbench.diagnosis.size import Size, sizes
@@ -102,8 +102,7 @@ def _begun_at(problem: Problem, candidate: Candidate, values: Mapping[str, float
     windows = windows_for(problem, candidate)
     unknowns = problem.unknowns(windows.plant, candidate)
     shapes = [f"{c.member}.{key}" for c in candidate.singles for key in c.cause.shapes]
-    held = {name: values[name] for name in shapes if name not in unknowns.names}
-    unknowns = replace(unknowns, held={**unknowns.held, **held})
+    unknowns = with_shape(problem, unknowns, {name: values[name] for name in shapes})
     t = unknowns.clipped(unknowns.scaled({**windows.plant.values, **values}))
     return windows, unknowns, t
 
@@ -201,8 +200,11 @@ def surplus(one: Fit, other: Fit) -> float:
     """What another fit misses more of the held-out windows, in standard deviations by chance.
 
     Windows are a sample of what may be recorded: sum d / sqrt(n var d), with d their differences.
+    One alone says nothing of chance: 0.
     """
     more = np.sum(_bounded(other) - _bounded(one), axis=0)
+    if len(more) < 2:
+        return 0.0
     return float(np.sum(more) / max(np.sqrt(len(more)) * np.std(more), 1e-300))
 
 

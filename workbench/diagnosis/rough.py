@@ -13,6 +13,7 @@ successive halving (Jamieson and Talwalkar 2016).
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -52,7 +53,7 @@ def rough_fit(problem: Problem, profile: Profile, most: int = STARTS) -> Rough:
     candidate, base = profile.candidate, problem.base
     windows = windows_for(problem, candidate)
     unknowns = problem.unknowns(windows.plant, *candidate.singles)
-    unknowns = _with_shape(problem, unknowns, profile)
+    unknowns = with_shape(problem, unknowns, profile.trials[0].values)
     blind = blind_starts(base.windows.plant, base.derivatives)
     started = _starts(problem, windows, unknowns, profile, most)
     if blind:
@@ -132,11 +133,11 @@ def windows_for(problem: Problem, candidate: Candidate) -> Windows:
     return windows.with_plant(staged(problem.whole, *needed))
 
 
-def _with_shape(problem: Problem, unknowns: Unknowns, profile: Profile) -> Unknowns:
-    """Shapes that no fit moves stay as the best size of the scan had them."""
+def with_shape(problem: Problem, unknowns: Unknowns, shape: Mapping[str, float]) -> Unknowns:
+    """Shapes that no fit moves stay as they are told, those that the rig fixes as it has them."""
     settled = {*unknowns.names, *problem.rig.fixed}
-    shape = {k: v for k, v in profile.trials[0].values.items() if k not in settled}
-    return replace(unknowns, held={**unknowns.held, **shape})
+    held = {name: value for name, value in shape.items() if name not in settled}
+    return replace(unknowns, held={**unknowns.held, **held})
 
 
 def _distinct(trials: tuple[Trial, ...], most: int) -> list[Trial]:

@@ -16,6 +16,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from workbench.candidate import Candidate, together
+from workbench.consistency import trusted
 from workbench.diagnosis.addition import (
     Addition,
     accept,
@@ -110,7 +111,7 @@ class Rounds:
 
 @dataclass(frozen=True)
 class _Asked:
-    """What every round is judged on."""
+    """What every round is judged on, as it was read: each diagnosis says what is doubtful in it."""
 
     train: Sequence[Recording]
     validation: Sequence[Recording]
@@ -198,7 +199,7 @@ def _further(done: Rounds, current: Rig, row: Ranked, asked: _Asked) -> Rounds:
     if second.contradicted or not _accepts(second) or not _is_effect(second.ranking[0]):
         return done.looked(refused, "no effect passes every criterion on top of it")
     leader = second.ranking[0]
-    problem = posed(current, asked.train, first.base, first.base_validation)
+    problem = posed(current, first.base, first.base_validation)
     pair = together(refused, leader.candidate)
     asked.progress(f"refit with {pair.name}")
     found = refit_shaken(problem, refit_from(problem, pair, leader.fit.plant.values))
@@ -215,9 +216,8 @@ def _further(done: Rounds, current: Rig, row: Ranked, asked: _Asked) -> Rounds:
 
 def _needless(both: Rounds, asked: _Asked) -> str:
     """Which half of the pair added last fails a criterion on top of the other, and which one."""
-    passes = Passes(
-        both.rig, asked.train, asked.validation, both.origins, asked.progress, both.opened
-    )
+    (train, validation), _ = trusted(both.rig, asked.train, asked.validation)
+    passes = Passes(both.rig, train, validation, both.origins, asked.progress, both.opened)
     for half in both.kept.steps[-2:]:
         removal, _ = passes.removal(both.kept, half)
         if removal.dropped:

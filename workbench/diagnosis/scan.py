@@ -20,7 +20,7 @@ Source: diagnosis.md 1.4.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import product
 
@@ -90,14 +90,15 @@ def scan(
     point: Point,
     candidates: Iterable[Candidate],
     at: Linearised | None = None,
+    fixed: Collection[str] = (),
 ) -> list[Profile]:
     """Profiles of all candidates, the one that explains most first.
 
     ``whole`` is the windows' plant with all absent effects in their places.  Candidates with
     states of their own are run on a plant that has them; the others share one, so that all their
-    sizes run side by side.  ``at`` are the
-    derivatives at the point where they are known already.  Every second window is enough to tell
-    candidates apart where there are many; drops count as of all.
+    sizes run side by side.  ``at`` are the derivatives at the point where they are known already,
+    ``fixed`` are shapes that stay.  Every second window is enough to tell candidates apart where
+    there are many; drops, in weighted squares, count as of all.
     """
     windows, point, metric, of_all = every_second(windows, unknowns, point, at)
     wide = metric_at(windows, unknowns.loosened(WIDER), point, metric.at)
@@ -111,7 +112,7 @@ def scan(
         trials = [
             (candidate, change)
             for candidate in members
-            for change in sizes_to_try(richer.plant, candidate)
+            for change in sizes_to_try(richer.plant, candidate, fixed)
         ]
         plants = [richer.plant.with_values({**values, **change}) for _, change in trials]
         residuals = richer.residuals(plants, starts)
@@ -129,7 +130,8 @@ def scan_catalogue(problem: Problem) -> list[Profile]:
     """Profiles of the causes that are not there and not shifts of fitted parameters."""
     base = problem.base
     absent, at = _absent(problem), problem.linearised
-    return scan(problem.whole, base.windows, base.unknowns, base.point, absent, at)
+    fixed = problem.rig.fixed
+    return scan(problem.whole, base.windows, base.unknowns, base.point, absent, at, fixed)
 
 
 def scan_from_priors(problem: Problem) -> list[Profile]:
@@ -138,12 +140,14 @@ def scan_from_priors(problem: Problem) -> list[Profile]:
     Parameters that imitate an effect hide it from a scan at the prior fit: what an underlap lets
     through, a leak and another heat flow together do too, several deviations off their priors, or
     within them where they are wide.
-    Its leaders alone are asked for: half the windows of the other scan are enough.
+    Its leaders alone are asked for: a quarter of the windows are enough, and drops count as of
+    these.
     """
     base = problem.base
     windows, kept = base.windows.part(max(len(base.windows) // 4, FEWEST_FROM_PRIORS))
     point = Point(problem.at_priors, base.point.starts[:, kept])
-    return scan(problem.whole, windows, base.unknowns, point, _absent(problem))
+    absent, fixed = _absent(problem), problem.rig.fixed
+    return scan(problem.whole, windows, base.unknowns, point, absent, fixed=fixed)
 
 
 def _absent(problem: Problem) -> list[Candidate]:
@@ -160,15 +164,19 @@ def _absent(problem: Problem) -> list[Candidate]:
     ]  # fmt: skip
 
 
-def sizes_to_try(plant: Plant, candidate: Candidate) -> list[dict[str, float]]:
-    """Parameter values of every size and shape of a candidate, within its bounds."""
+def sizes_to_try(
+    plant: Plant, candidate: Candidate, fixed: Collection[str] = ()
+) -> list[dict[str, float]]:
+    """Parameter values of every size and shape of a candidate, within its bounds.
+
+    Shapes that are ``fixed`` stay as the plant has them.
+    """
     known = plant.parameters[candidate.strength]
     null = known.null or 0.0
     signs = (1.0, -1.0) if known.signed else (1.0,)
-    shapes = [
-        dict(zip((f"{candidate.member}.{k}" for k in candidate.cause.shapes), v, strict=True))
-        for v in product(*candidate.cause.shapes.values())
-    ]
+    grids = {f"{candidate.member}.{key}": grid for key, grid in candidate.cause.shapes.items()}
+    grids = {name: grid for name, grid in grids.items() if name not in fixed}
+    shapes = [dict(zip(grids, values, strict=True)) for values in product(*grids.values())]
     return [
         {candidate.strength: null + sign * size * known.typical, **shape}
         for sign in signs

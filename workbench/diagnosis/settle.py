@@ -73,7 +73,8 @@ def _settled_row(problem: Problem, row: Ranked, leads: bool) -> Ranked:
     plain = plain_ratio(problem.base_validation, validation)
     if plain > MOST_PLAIN and plain > row.plain_validation:
         return row
-    return replace(row, fit=fit, validation=validation, size=sizes(fit, tuple(row.size)))
+    size = sizes(fit, tuple(row.size))
+    return replace(row, fit=fit, validation=validation, plain_validation=plain, size=size)
 
 
 def _steady(before: Mapping[str, Size], now: Mapping[str, Size]) -> bool:

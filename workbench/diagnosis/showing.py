@@ -60,7 +60,8 @@ def showing(
         return advice
     fits = [base, *(supposed(problem, candidate) for candidate in blind)]
     limits = limits_of(base.plant, base.windows.recordings)
-    rehearsed = inside(fits, limits, library)
+    long_enough = limits.samples >= base.windows.length
+    rehearsed = inside(fits, limits, library) if long_enough else []
     if not rehearsed:
         return advice
     needs = np.array([_needed(problem, limits, candidate) for candidate in blind])

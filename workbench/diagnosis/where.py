@@ -129,7 +129,8 @@ def _worst(gains: Mapping[Suspect, Mapping[float, float]]) -> Suspect:
 def acts_in(candidate: Candidate, balance: str) -> bool:
     """True where a cause enters a balance, as :attr:`Where.balance` names it.
 
-    What acts on flows shows in the gas of every chamber, and what acts in one place only there.
+    What acts on flows shows in the gas of every chamber, and what acts in one chamber only there.
+    A force is carried on to every body, through stops, levers and links.
     """
     place, _, kind = balance.rpartition(".")
     own = candidate.cause.balance

@@ -103,10 +103,14 @@ def plain_ratio(before: Fit | None, after: Fit | None) -> float:
     """Squared error after over before, nothing capped: geometric mean over outputs, NaN without.
 
     What could not be simulated counts with its penalty: a plant is no better for stopping short.
+    An output of which nothing is recorded has no say.
     """
     if before is None or after is None:
         return float("nan")
-    ratios = penalised_rmse(after) / np.maximum(penalised_rmse(before), 1e-300)
+    seen = np.isfinite(before.windows.measured).any(axis=(1, 2))
+    if not seen.any():
+        return float("nan")
+    ratios = penalised_rmse(after)[seen] / np.maximum(penalised_rmse(before)[seen], 1e-300)
     return float(np.exp(2.0 * np.mean(np.log(np.maximum(ratios, 1e-12)))))
 
 

@@ -263,9 +263,13 @@ def plant_at(windows: Windows, unknowns: Unknowns, t: np.ndarray) -> Plant:
 
 
 def parameter_steps(unknowns: Unknowns, t: np.ndarray) -> np.ndarray:
-    """Steps of the scaled unknowns, turned round where they would leave the bounds."""
-    room = unknowns.ends[1] - t
-    return np.where(room > PARAMETER_STEP, PARAMETER_STEP, -PARAMETER_STEP)
+    """Steps of the scaled unknowns, turned round where they would leave the bounds.
+
+    As long as the longer way to a bound where both are nearer.
+    """
+    below, above = t - unknowns.ends[0], unknowns.ends[1] - t
+    up = (above > PARAMETER_STEP) | (above > below)
+    return np.where(up, np.minimum(above, PARAMETER_STEP), -np.minimum(below, PARAMETER_STEP))
 
 
 def unit(n: int, k: int) -> np.ndarray:

@@ -203,9 +203,9 @@ def pose(
     return Problem(rig, whole, added, base, held_out, believed)
 
 
-def posed(rig: Rig, train: Sequence[Recording], base: Fit, base_validation: Fit | None) -> Problem:
+def posed(rig: Rig, base: Fit, base_validation: Fit | None) -> Problem:
     """A problem whose fits are there already, those of a diagnosis of the rig."""
-    whole = rig.fit_for(train[0])
+    whole = rig.fit_for(base.windows.recordings[0])
     return Problem(rig, whole, rig.added_to(whole), base, base_validation, BELIEVED)
 
 

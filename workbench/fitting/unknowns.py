@@ -110,8 +110,9 @@ def nominal_unknowns(
     bounds = {name: (known[name].lower, known[name].upper) for name, *_ in rows}
     for candidate in plant.candidates.values():
         name, tolerated = candidate.strength, candidate.cause.tolerated
-        if tolerated and name not in bounds and name not in fixed:
-            rows.append((name, values[name], tolerated[0], 1.0))
+        deviation = deviations.get(name, tolerated[0]) if tolerated else 0.0
+        if tolerated and deviation > 0.0 and name not in bounds and name not in fixed:
+            rows.append((name, values[name], deviation, 1.0))
             bounds[name] = (known[name].lower, tolerated[1])
     names = tuple(row[0] for row in rows)
     prior, scale, precision = (np.array([row[k] for row in rows]) for k in (1, 2, 3))

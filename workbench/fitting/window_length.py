@@ -36,7 +36,7 @@ def window_length_s(
 
     A position alone says little of flows and forces in a fifth of a second.  Short experiments,
     such as kicks from rest, stay whole, or as long as the shortest of them: each has a start of its
-    own.  A piece less than half as long as most is a stub that gets no window.
+    own.  A piece less than half as long as most of its set is a stub that gets no window.
 
     Where nothing moves, a window lasts three time constants of the gas, or a 24th of the training
     where that is less; a decay so slow that its recording holds no three stays whole, or as long as
@@ -44,7 +44,7 @@ def window_length_s(
     No window has fewer than 20 samples.
     """
     least_s = FEWEST_SAMPLES * train[0].sample_time_s
-    shortest_s = _shortest_piece_s([*train, *validation])
+    shortest_s = min(_shortest_piece_s(each) for each in (train, validation) if each)
     if position_alone(plant):
         wanted_s = shortest_s if shortest_s <= LONGEST_PIECE_S else POSITION_WINDOW_S
     elif moves(plant) or not plant.state_list:

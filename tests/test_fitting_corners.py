@@ -1,0 +1,125 @@
+"""Corners of fits and rankings: silent outputs, single windows, narrow bounds, what a rig holds."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from workbench.diagnosis.ranking import _reason_not_asked
+from workbench.diagnosis.refit import surplus
+from workbench.diagnosis.rough import with_shape
+from workbench.diagnosis.scan import sizes_to_try
+from workbench.fitting.errors import plain_ratio
+from workbench.fitting.linearised import parameter_steps
+from workbench.fitting.unknowns import Unknowns, nominal_unknowns
+from workbench.fitting.window_length import window_length_s
+from workbench.law_scales import scales
+from workbench.recording import Recording
+from workbench.recordings import chamber_decay
+from workbench.rig import default_rig, load_rig
+from workbench.rig_laws import law_terms, with_laws
+
+DRIVE = default_rig("servo_drive")
+PRESSURE = "chamber.pressure_pa"
+
+
+def errors(size: float, windows: int = 4) -> SimpleNamespace:
+    """A fit whose residual is as large everywhere; nothing is recorded of its third output."""
+    measured, residual = np.zeros((3, windows, 10)), np.full((3, windows, 10), size)
+    measured[2], residual[2] = np.nan, 0.0
+    cut = SimpleNamespace(
+        measured=measured,
+        scale=np.ones((3, windows)),
+        length=10,
+        correlation=np.ones((3, windows)),
+    )
+    return SimpleNamespace(windows=cut, residual=residual)
+
+
+def test_an_output_of_which_nothing_is_recorded_has_no_say_in_the_plain_error():
+    assert plain_ratio(errors(1.0), errors(2.0)) == pytest.approx(4.0)
+
+
+def test_one_held_out_window_says_nothing_of_chance():
+    assert surplus(errors(0.5, windows=1), errors(0.6, windows=1)) == 0.0
+
+
+def decay(seconds: float) -> Recording:
+    t = 0.1 * np.arange(round(seconds / 0.1))
+    return Recording("decay", 0.1, {PRESSURE: 8e5 * np.exp(-t / 2000.0)}, {PRESSURE: 100.0})
+
+
+@pytest.mark.parametrize("seconds", [19, 21])
+def test_a_short_held_out_recording_is_no_stub_beside_a_long_training(seconds):
+    plant = chamber_decay.rig().plant.lean()
+
+    assert window_length_s(plant, [decay(60)], [decay(seconds)]) == pytest.approx(seconds)
+
+
+def test_a_step_ends_where_the_bounds_end():
+    narrow = Unknowns(
+        ("a",), np.array([0.5]), np.array([5.0]), np.zeros(1), np.ones(1), np.ones(1)
+    )  # fmt: skip
+    for t in (0.0, 0.06, -0.06):
+        (step,) = parameter_steps(narrow, np.array([t]))
+        made = (narrow.values(np.array([t + step]))["a"] - 0.5) / 5.0 - t
+
+        assert step != 0.0
+        assert made == pytest.approx(step, rel=1e-12)
+
+
+def test_what_the_rig_says_of_a_tolerated_delay_is_heard():
+    tolerated = next(c for c in DRIVE.plant.candidates.values() if c.cause.tolerated)
+    surer = nominal_unknowns(DRIVE.plant, {tolerated.strength: 1e-5})
+    none = nominal_unknowns(DRIVE.plant, {tolerated.strength: 0.0})
+
+    assert surer.scale[surer.names.index(tolerated.strength)] == 1e-5
+    assert tolerated.strength not in none.names
+
+
+def test_a_shift_of_what_has_no_uncertainty_says_so():
+    rig = load_rig('plant = "servo_drive"\n[uncertainty]\n"slide.mass" = "0 kg"\n')
+    unknowns = nominal_unknowns(rig.plant, rig.deviations, rig.fixed)
+    problem = SimpleNamespace(whole=rig.plant, rig=rig, base=SimpleNamespace(unknowns=unknowns))
+
+    said = _reason_not_asked(problem, rig.plant.candidates["added_mass"])
+
+    assert said == "not applicable: slide.mass has no uncertainty"
+
+
+def test_a_shape_that_the_rig_fixes_is_neither_scanned_nor_held_elsewhere():
+    stiction = DRIVE.plant.candidates["stiction"]
+    (shape,) = (f"{stiction.member}.{key}" for key in stiction.cause.shapes)
+    rig = load_rig('plant = "servo_drive"\n[fixed]\nnames = ["friction.stribeck_velocity"]\n')
+    unknowns = nominal_unknowns(rig.plant, fixed=rig.fixed)
+    free, fixed = (
+        with_shape(SimpleNamespace(rig=each), unknowns, {shape: 0.0123}).held
+        for each in (DRIVE, rig)
+    )
+
+    assert shape in rig.fixed
+    assert any(shape in trial for trial in sizes_to_try(rig.plant, stiction))
+    assert not any(shape in trial for trial in sizes_to_try(rig.plant, stiction, rig.fixed))
+    assert free[shape] == 0.0123 and shape not in fixed
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_terms_of_a_law_have_sizes_where_sensors_take_turns_or_are_silent(order):
+    n = 400
+    rows = np.arange(n) % 2 == 0
+    channels = {
+        "slide.position_m": np.linspace(0.1, 0.2, n),
+        "chamber_a.pressure_pa": np.where(rows, 6e5, np.nan),
+        "chamber_b.pressure_pa": np.where(rows, np.nan, 4e5),
+    }
+    silent = dict.fromkeys(channels, np.full(n, np.nan))
+    recordings = [Recording("a", 1e-3, channels), Recording("b", 1e-3, silent)][::order]
+    plant = with_laws(DRIVE.plant, [*law_terms(DRIVE.plant)])
+    laws = [effect for effect in plant.effects if effect.name.startswith("law[")]
+
+    found = scales(laws, recordings)
+
+    assert all(np.isfinite(value) and value > 0.0 for value in found.values())
+    assert found["law[dp]@slide.pressure_pa"] == pytest.approx(2e5)
+    assert found["law[sign v dp]@slide.stroke_m"] == pytest.approx(0.1)
+    plant.with_values(found)
