@@ -4,6 +4,7 @@ Noise      A signal with any motion in it is smoother than white noise: the thir
            white noise have 20 times its variance, those of a motion next to none.
 Stuck      Equal to the last bit for a while, in a channel that otherwise changes from sample to
            sample, while the plant says that it moves.
+Still      The same in a coarse channel, which repeats values anyway: there the plant may rest.
 Saturated  At an end of what it can show, to the last bit, again and again.
 Missing    Silent for a while, many times longer than between its other samples.
 Stops      No body gets through them.
@@ -23,7 +24,7 @@ from workbench.effects.forces import EndStops
 from workbench.fitting.noise import THIRD_DIFFERENCE_GAIN, NoNoiseError, measured_noise
 from workbench.fitting.window_cuts import evenly
 from workbench.plant import Plant
-from workbench.reading.plausible import saturation_text, stuck_stretch
+from workbench.reading.plausible import saturation_text, still_stretch, stuck_stretch
 from workbench.recording import Recording
 from workbench.saturation import saturated
 from workbench.units import display_unit, public_name, scale
@@ -109,21 +110,44 @@ def stuck(plant: Plant, recording: Recording) -> tuple[Recording, list[Finding]]
     channels = dict(recording.channels)
     for name in plant.measured:
         stretch = stuck_stretch(recording[name])
-        if stretch is None or not _should_move(plant, recording, name, stretch):
+        if stretch is None:
+            found += _still(plant, recording, name)
+            continue
+        if not _should_move(plant, recording, name, stretch):
             continue
         first, length = stretch
         kept = recording[name].copy()
         kept[first : first + length] = np.nan
         channels[name] = kept
-        begin_s, end_s = (recording.sample_time_s * k for k in (first, first + length - 1))
-        shown = scale(display_unit(name), name).from_si(recording[name][first])
-        what = (
-            f"stuck at {shown:.5g} {display_unit(name)} from {begin_s:.4g} to {end_s:.4g} s, while "
-            "the plant says it moves"
-        )
+        what = f"stuck at {_moving_elsewhere(recording, name, stretch)}"
         remedy = "these samples are left out; check the sensor"
         found.append(_finding(Weight.DOUBT, recording, name, what, remedy))
     return replace(recording, channels=channels), found
+
+
+def _still(plant: Plant, recording: Recording, name: str) -> list[Finding]:
+    """A word on a coarse sensor that stands still for long while the plant says that it moves.
+
+    It also does so where a plant rests whose model lacks what holds it, so its samples stay.
+    """
+    first, length = still_stretch(recording[name])
+    long = length >= WORTH_A_WORD * len(recording)
+    if not (long and _should_move(plant, recording, name, (first, length))):
+        return []
+    what = f"stands at {_moving_elsewhere(recording, name, (first, length))}"
+    remedy = "if the sensor is stuck leave these samples out; they are kept"
+    return [_finding(Weight.NOTICE, recording, name, what, remedy)]
+
+
+def _moving_elsewhere(recording: Recording, name: str, stretch: tuple[int, int]) -> str:
+    """A value and the time in which a channel keeps it although it should not."""
+    first, length = stretch
+    begin_s, end_s = (recording.sample_time_s * k for k in (first, first + length - 1))
+    shown = scale(display_unit(name), name).from_si(recording[name][first])
+    return (
+        f"{shown:.5g} {display_unit(name)} from {begin_s:.4g} to {end_s:.4g} s, while the plant "
+        "says it moves"
+    )
 
 
 def _without_saturated(plant: Plant, recording: Recording) -> tuple[Recording, list[Finding]]:

@@ -152,13 +152,27 @@ def stuck_stretch(values: np.ndarray) -> tuple[int, int] | None:
     Samples are held against the next one there is.  None where it is short, or where the channel
     often stands still.
     """
-    there = np.flatnonzero(np.isfinite(values))
-    same = np.diff(values[there]) == 0
+    there, same = _repeats(values)
     length, first = _longest_run(same)
     rest = np.delete(same, slice(first, first + length)) if length else same
     if length < RUN or not len(rest) or rest.mean() > LIVELY:
         return None
     return int(there[first]), int(there[first + length] - there[first]) + 1
+
+
+def still_stretch(values: np.ndarray) -> tuple[int, int]:
+    """The same of any channel: a coarse sensor stands still between its steps, (0, 1) at least."""
+    there, same = _repeats(values)
+    length, first = _longest_run(same)
+    if not length:
+        return 0, 1
+    return int(there[first]), int(there[first + length] - there[first]) + 1
+
+
+def _repeats(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Samples that there are, and whether the next one of each is equal to the last bit."""
+    there = np.flatnonzero(np.isfinite(values))
+    return there, np.diff(values[there]) == 0
 
 
 def _longest_run(same: np.ndarray) -> tuple[int, int]:
