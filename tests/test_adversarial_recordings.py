@@ -125,19 +125,6 @@ def test_a_stuck_sensor_is_doubtful_and_its_samples_are_left_out(demo, name, pub
     assert np.array_equal(left[B], train[B])
 
 
-@pytest.mark.parametrize(("name", "step"), [(PLACE, 2e-4), (A, 2e3)])
-def test_a_coarse_sensor_that_stands_still_while_the_plant_moves_is_told(demo, name, step):
-    """It repeats values anyway, and the plant may rest there: its samples are kept."""
-    rig, train, _ = demo
-    coarse = replace(train, channels={**train.channels, name: step * np.round(train[name] / step)})
-    ((kept,),), findings = trusted(rig, [spoil.stuck(name, 3.0)(coarse)])
-    (finding,) = (each for each in findings if "stands at" in each.what)
-
-    assert said(rig, coarse) == []
-    assert finding.weight is Weight.NOTICE and "to 9.999 s, while the plant" in finding.what
-    assert np.isfinite(kept[name]).all()
-
-
 def test_an_uneven_clock_is_noticed_with_its_size(demo):
     rig, train, _ = demo
     ((weight, text),) = said(rig, spoil.SERVO_DRIVE["clock jitter"](train))

@@ -24,7 +24,7 @@ from workbench.effects.forces import EndStops
 from workbench.fitting.noise import THIRD_DIFFERENCE_GAIN, NoNoiseError, measured_noise
 from workbench.fitting.window_cuts import evenly
 from workbench.plant import Plant
-from workbench.reading.plausible import saturation_text, still_stretch, stuck_stretch
+from workbench.reading.plausible import RUN, saturation_text, still_stretch, stuck_stretch
 from workbench.recording import Recording
 from workbench.saturation import saturated
 from workbench.units import display_unit, public_name, scale
@@ -213,7 +213,7 @@ def uneven_clock(plant: Plant, recording: Recording) -> list[Finding]:
     """A word on samples that are not taken when the clock says, as far as channels can show it."""
     jitters = [_jitter(recording, name) for name in plant.measured]
     seen = [jitter for jitter, finest in jitters if finest < FINE]
-    if not seen or min(seen) < UNEVEN:
+    if not seen or not UNEVEN <= min(seen) <= 1.0:  # nothing is sampled before the sample ahead
         return []
     late_ms = 1e3 * min(seen) * recording.sample_time_s
     what = (
@@ -226,7 +226,15 @@ def uneven_clock(plant: Plant, recording: Recording) -> list[Finding]:
 
 
 def _jitter(recording: Recording, name: str) -> tuple[float, float]:
-    """Standard deviation of the sampling instant in samples, and the finest that would show."""
+    """Standard deviation of the sampling instant in samples, and the finest that would show.
+
+    Where a sensor stands still for long its noise cannot be told.
+    """
+    first, length = still_stretch(recording[name])
+    if length >= RUN:
+        values = recording[name].copy()
+        values[first : first + length] = np.nan
+        recording = replace(recording, channels={**recording.channels, name: values})
     try:
         noise = measured_noise([replace(recording, noise={})], [name])[name]
     except NoNoiseError:
