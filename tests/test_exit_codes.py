@@ -3,6 +3,7 @@
 import subprocess
 import sys
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
@@ -33,6 +34,21 @@ def test_what_goes_wrong_becomes_an_exit_code(error, code):
         raise error
 
     assert stopped.value.exit_code == code
+
+
+@pytest.mark.parametrize(
+    "wrong", [lambda: np.zeros(2) + np.zeros(3), lambda: np.full((2, 2), 1.0) @ np.zeros(3),
+              lambda: int("seven"), lambda: plt.figure().add_subplot(1, 1, 7)],
+)  # fmt: skip
+def test_what_an_operation_or_a_library_refuses_is_no_wrong_input(wrong, capsys):
+    """Shapes that do not fit were told as if the user had given them."""
+    import typer
+
+    with pytest.raises(typer.Exit) as stopped, answering(quiet=True):
+        wrong()
+
+    assert stopped.value.exit_code == 3
+    assert capsys.readouterr().err.startswith("workbench: inside the program: ValueError")
 
 
 def test_an_unknown_name_reads_as_its_message_and_is_a_key_error(capsys):

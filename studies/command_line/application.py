@@ -7,6 +7,7 @@ import os
 import shlex
 import sys
 import time
+import traceback
 import warnings
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
     from studies.workers import Workers
 
 DONE, NO, WRONG_INPUT, SOLVER_FAILED, STOPPED, UNREAD = 0, 1, 2, 3, 130, 141
+LIBRARIES = "site-packages"  # where they are installed, and this program may be
+PACKAGES = ("workbench", "linearize", "controllers", "estimators", "studies")
 DEBUG = "WORKBENCH_DEBUG"  # set to anything, what is unforeseen is shown in full
 
 app = typer.Typer(
@@ -102,8 +105,6 @@ def answering(quiet: bool = False) -> Iterator[Callable[[str], None]]:
         _stop(str(error), WRONG_INPUT)
     except (ArithmeticError, _linear_algebra_error()) as error:
         _stop(str(error), SOLVER_FAILED)
-    except ValueError as error:
-        _stop(str(error.args[0]) if error.args else repr(error), WRONG_INPUT)
     except BrokenPipeError:
         _unread()
     except OSError as error:
@@ -113,6 +114,8 @@ def answering(quiet: bool = False) -> Iterator[Callable[[str], None]]:
     except (typer.Exit, typer.Abort):
         raise
     except Exception as error:
+        if isinstance(error, ValueError) and _meant(error):
+            _stop(str(error.args[0]) if error.args else repr(error), WRONG_INPUT)
         if os.environ.get(DEBUG):
             raise
         _stop(_unforeseen(error), SOLVER_FAILED)
@@ -142,6 +145,18 @@ class _Teller(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         tell = _warned if record.levelno >= logging.WARNING else self.say
         tell(record.getMessage())
+
+
+def _meant(error: ValueError) -> bool:
+    """Whether a line of ours raised it, for whoever asked; an operation or a library means no one.
+
+    Shapes that do not fit are a ValueError of numpy's too.
+    """
+    *_, last = traceback.extract_tb(error.__traceback__)
+    parts = Path(last.filename).parts
+    home = parts.index(LIBRARIES) + 1 if LIBRARIES in parts else 0
+    ours = not home or parts[home] in PACKAGES
+    return ours and (last.line or "raise").startswith("raise")
 
 
 def _unforeseen(error: Exception) -> str:
