@@ -14,6 +14,7 @@ from studies import (
     mode_count_study,
     mode_placement,
     paper_004,
+    real_recordings,
     robustness_study,
     shift_study,
 )
@@ -37,6 +38,7 @@ STUDIES: dict[str, Study] = {
         paper_004.STUDY,
         controllers_study.STUDY,
         identification_study.STUDY,
+        real_recordings.STUDY,
         delay_study.STUDY,
         mode_count_study.STUDY,
         fidelity_study.STUDY,

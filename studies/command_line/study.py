@@ -28,6 +28,9 @@ def study(
     full: Annotated[
         bool, typer.Option("--full", help="The whole grid, which may take hours; it resumes.")
     ] = False,
+    data: Annotated[
+        Path | None, typer.Option("--data", metavar="DIR", help="Folder of the real recordings.")
+    ] = None,
     workers: ProcessCount = None,
     scheduler: Scheduler = "",
     quiet: Quiet = False,
@@ -45,8 +48,11 @@ def study(
         from studies.running import ALL, chosen, run_all, run_study
         from studies.study import Extent
         from studies.workers import working_with
+        from workbench.recordings.folder import use_real_data
 
         writable(folders=[output])
+        if data:
+            use_real_data(data)
         extent = Extent.FULL if full else Extent.QUICK
         where, asked = workers_of(workers, scheduler), chosen(name)
         if name == ALL and not scheduler:
