@@ -26,10 +26,12 @@ from studies.draws import kept_rows
 from studies.kept import Row
 from studies.study import Claim, Extent, Outcome, Study
 from studies.text import columns, number
+from workbench.diagnosis.addition import accept
 from workbench.diagnosis.diagnose import diagnose
 from workbench.diagnosis.improve import improve
 from workbench.diagnosis.result import Verdict
 from workbench.fitting.gauss_newton import Fit
+from workbench.fitting.problem import pose
 from workbench.recording import Recording
 from workbench.recordings import (
     chamber_decay,
@@ -45,6 +47,11 @@ ABOVE = 1.10  # of the best by plain least squares
 SEAL, KICKS, CHAMBER = "seal", "kicks", "chamber"
 UNITS = {SEAL: "N", KICKS: "mm", CHAMBER: "mbar"}
 CAUSES = ("chamber_leak", "wall_heat")  # of a decay: not to be told apart within 140 s
+NOTE = (
+    "RMSE on recordings that nothing was fitted to.  The 3.3 mbar of the aluminium chamber are "
+    "those of that README;\nleast squares of start pressure and leak on the same samples gives 4.1 "
+    "(tests/test_closed_chamber.py)"
+)
 ABSENT = "the real recordings are not there: --data DIR, or the environment variable WORKBENCH_DATA"
 
 
@@ -114,12 +121,13 @@ def whole_kicks_m(rig: Rig, kicks: Sequence[Recording]) -> float:
 
 
 def _chamber(folder: Path, chamber: str) -> Row:
-    """A decay, of which the first 60 % are fitted."""
+    """A decay, of which the first 60 % are fitted, whole once it is known what is missing."""
     train, rest = chamber_decay.recordings(folder, chamber)
-    found = diagnose(chamber_decay.rig(), [train], [rest])
-    leader, whole = found.ranking[0], chamber_decay.decay(folder, chamber)
-    bare, left = (_run_on_mbar(fit, whole, len(train)) for fit in (found.base, leader.fit))
-    named = [leader.candidate.name, *leader.tied_with]
+    rig, whole = chamber_decay.rig(), chamber_decay.decay(folder, chamber)
+    found = diagnose(rig, [train], [rest])
+    fits = (pose(each, [train]).base for each in (rig, accept(rig, found).rig))
+    bare, left = (_run_on_mbar(fit, whole, len(train)) for fit in fits)
+    named = [found.ranking[0].candidate.name, *found.ranking[0].tied_with]
     return {"named": named, "bare": bare, "left": left, "tied": found.verdict is Verdict.TIE}
 
 
@@ -163,7 +171,7 @@ def _text(cases: Sequence[Case], rows: Sequence[Mapping[str, Any]]) -> str:
          number(case.best, 3), UNITS[case.kind])
         for case, row in zip(cases, rows, strict=True)
     ]  # fmt: skip
-    return f"{columns(head, lines)}\nRMSE on recordings that nothing was fitted to"
+    return f"{columns(head, lines)}\n{NOTE}"
 
 
 def _named(row: Mapping[str, Any]) -> str:

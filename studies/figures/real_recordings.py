@@ -20,6 +20,7 @@ TITLES = {
     "kicks": "position of a vertical cylinder",
     "chamber": "pressure of a closed chamber",
 }
+ACROSS = {"seal": "seal", "kicks": "trained on kicks", "chamber": "chamber"}
 
 
 def real_figure(
@@ -40,6 +41,7 @@ def real_figure(
                 axes.bar_label(drawn, fmt="%.3g", fontsize=6)
             axes.margins(y=0.15)
             axes.grid(False, axis="x")
+            axes.set_xlabel(ACROSS[kind])
             axes.set_ylabel(f"RMSE held out ({units[kind]})")
             axes.set_title(TITLES[kind], fontsize=8)
         handles, labels = panels[0].get_legend_handles_labels()
