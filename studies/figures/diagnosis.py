@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from workbench.diagnosis.result import Diagnosis, Ranked, Where
 
 SHOWN, SHOWN_BALANCES, SHOWN_DRIVERS = 10, 8, 3
+FEWEST_ROWS = 3  # that a panel has room for: one balance alone would be a wall
 HOLLOW = {"color": "white", "edgecolor": GREY, "hatch": "....", "linewidth": 0.6}
 SAID = 0.02  # of the variance of a missing term: less that parameters explain is not said
 
@@ -170,7 +171,7 @@ def _draw_balances(axes: Axes, where: Where) -> None:
     axes.set_yticks(places, [name.replace(".", " ").replace("_", " ") for name, _ in gains])
     colours = [RED if name == where.balance else GREY for name, _ in gains]
     axes.barh(places, [max(gain, 0.0) for _, gain in gains], 0.6, color=colours)
-    axes.invert_yaxis()
+    axes.set_ylim(max(len(gains), FEWEST_ROWS) - 0.5, -0.5)
     axes.set_xlabel("gained log-likelihood (-)")
     axes.set_title("which balance")
 

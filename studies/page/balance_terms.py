@@ -34,6 +34,8 @@ def terms_of(rig: Rig, base: Fit, worst: Where) -> dict[str, Where]:
     worst
         What the diagnosis found of the balance that gains most.
     """
+    if worst.course is None:  # of a bench without states there is one
+        return {worst.balance: worst}
     recording = joined(base.windows.recordings)
     plant, flows = with_missing_flows(rig.fit_for(base.windows.recordings[0]).lean())
     astray = wandering(plant, base.windows)

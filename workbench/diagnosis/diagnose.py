@@ -50,6 +50,7 @@ from workbench.diagnosis.verdict import (
     worsened,
 )
 from workbench.diagnosis.where import locate
+from workbench.diagnosis.where_stateless import of_residual
 from workbench.effect import Kind
 from workbench.fitting.errors import errors_of
 from workbench.fitting.posterior import strained
@@ -104,6 +105,7 @@ def diagnose(
         warnings += ("the prior fit did not converge: the ranking is provisional",)
     if where and found.problem.base is not begun:
         where = replace(where, by_regime=regime_shares(found.problem.base))
+    where = where or of_residual(found.problem.base)
     told = _concluded(rig.name, found, where, evidence, progress)
     told = credible(replace(told, warnings=warnings + told.warnings), doubts)
     unsure = unsteady(told.ranking, found.profiles, told.verdict)
