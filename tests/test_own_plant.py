@@ -73,6 +73,19 @@ def test_the_effects_of_an_own_plant_are_listed_its_own_too(folder):
     assert "coulomb_friction" in answer.stdout
 
 
+def test_the_sensors_of_an_own_plant_compete_where_it_asks_for_them(tmp_path):
+    """As the README says, by one line among its effects."""
+    (line,) = re.findall(r"`(\*sensor_flaws\(.*?\))`", README.read_text())
+    code = example().replace("        effects=(\n", f"        effects=(\n            {line},\n")
+    path = tmp_path / "my_plant.py"
+    path.write_text(f"from workbench.effects.sensors import sensor_flaws\n{code}")
+    answer = call("effects", f"{path}:joint")
+
+    assert answer.exit_code == 0, answer.output
+    for flaw in ("sensor_lag", "sensor_scale", "sensor_offset"):
+        assert flaw in answer.stdout
+
+
 def test_an_own_effect_is_found_and_added(folder):
     out, found = folder / "sub" / "better.toml", folder / "found.json"
     train, held_out = folder / "train.csv", folder / "validation.csv"
