@@ -60,7 +60,7 @@ class Improvement:
         What the rounds added, in order, the terms of a law at the end; also what was dropped later.
     diagnoses
         One for each round, and one more where an effect that a round had refused came in with the
-        next one; the last one accepted nothing, unless the user stopped it.
+        next one; the last one accepted nothing, unless the user stopped it or no round was left.
     ahead
         What was tried for one round more, also in vain.
     removals, swaps

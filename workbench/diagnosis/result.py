@@ -71,7 +71,8 @@ class Ranked:
     size
         Strength and forms by full parameter name; empty where the scan alone decided.
     drop_train, drop_validation
-        Share of the noise-weighted squared error beyond noise that goes away; the second is NaN
+        Share of the squared error beyond noise that goes away, weighed by noise and by the typical
+        errors of the model without it (:mod:`workbench.fitting.error_model`); the second is NaN
         where the candidate was not refitted.
     tied_with
         Public names of the candidates that cannot be told apart from it here.
