@@ -65,7 +65,12 @@ def chosen(
 
 
 def inside(fits: Sequence[Fit], limits: Limits, library: Sequence[Manoeuvre]) -> list[Rehearsed]:
-    """Manoeuvres that break no limit for any plant, each as large as it may be."""
+    """Manoeuvres that break no limit for any plant, each as large as it may be.
+
+    None where windows last longer than any: nothing could be judged by them.
+    """
+    if limits.samples < fits[0].windows.length:
+        return []
     left = [each for each in library if each.drive is limits.drive]
     maps = tuple(speed_maps(fits[0], limits))
     found = []

@@ -82,10 +82,9 @@ def next_recording(rivals: Plants, library: Sequence[Manoeuvre] = LIBRARY) -> Ne
     if len(rivals) < 2:
         raise ValueError(f"next recording: {len(rivals)} rivals; expected at least two")
     fits = list(rivals.values())
-    windows = fits[0].windows
-    limits = limits_of(fits[0].plant, windows.recordings)
-    rehearsed = inside(fits, limits, library) if limits.samples >= windows.length else []
-    if not rehearsed:  # nor is a manoeuvre that is shorter than one window
+    limits = limits_of(fits[0].plant, fits[0].windows.recordings)
+    rehearsed = inside(fits, limits, library)
+    if not rehearsed:
         return None
     least = _least(fits)
 

@@ -60,8 +60,7 @@ def showing(
         return advice
     fits = [base, *(supposed(problem, candidate) for candidate in blind)]
     limits = limits_of(base.plant, base.windows.recordings)
-    long_enough = limits.samples >= base.windows.length
-    rehearsed = inside(fits, limits, library) if long_enough else []
+    rehearsed = inside(fits, limits, library)
     if not rehearsed:
         return advice
     needs = np.array([_needed(problem, limits, candidate) for candidate in blind])

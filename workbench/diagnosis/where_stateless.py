@@ -24,9 +24,8 @@ from workbench.diagnosis.result import Where
 from workbench.effect import Balance
 from workbench.fitting.errors import in_units, per_sample
 from workbench.fitting.gauss_newton import Fit
-from workbench.fitting.window_cuts import cut_rows
+from workbench.fitting.window_cuts import cut_inputs
 from workbench.fitting.windows import Windows
-from workbench.simulation import inputs
 
 FORCE = ".force_n"
 NOISE_KNOWN = 1.1  # times its square: beyond that an error is more than noise
@@ -42,7 +41,8 @@ def of_residual(base: Fit) -> Where | None:
         return None
     seen = np.isfinite(windows.measured[0]).ravel()
     term = in_units(base)[0].ravel()[seen]
-    u, d = (rows[:, seen] for rows in _fed(windows))
+    fed = cut_inputs(plant, windows.recordings, windows.firsts, windows.length)
+    u, d = (rows[:, seen] for rows in fed)
     course = Course("", "", np.zeros((0, int(seen.sum()))), u, d)
     time_s = _times(windows)[seen]
     followed = drivers(plant, course, time_s)
@@ -66,17 +66,6 @@ def of_residual(base: Fit) -> Where | None:
 def _gain(base: Fit) -> float:
     """Log-likelihood that an input gains which explains all but noise."""
     return 0.5 * effective_samples(base) * log(max(per_sample(base) / NOISE_KNOWN, 1.0))
-
-
-def _fed(windows: Windows) -> tuple[np.ndarray, np.ndarray]:
-    """Commands and measured inputs window after window, n columns each."""
-    cut = [
-        [cut_rows(rows, firsts, windows.length) for rows in inputs(windows.plant, recording)]
-        for recording, firsts in zip(windows.recordings, windows.firsts, strict=True)
-    ]
-    u, d = (np.concatenate([each[k] for each in cut], axis=1) for k in (0, 1))
-    samples = len(windows) * windows.length
-    return u.reshape(len(u), samples), d.reshape(len(d), samples)
 
 
 def _times(windows: Windows) -> np.ndarray:

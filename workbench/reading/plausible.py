@@ -157,15 +157,18 @@ def stuck_stretch(values: np.ndarray) -> tuple[int, int] | None:
     rest = np.delete(same, slice(first, first + length)) if length else same
     if length < RUN or not len(rest) or rest.mean() > LIVELY:
         return None
-    return int(there[first]), int(there[first + length] - there[first]) + 1
+    return _span(there, first, length)
 
 
 def still_stretch(values: np.ndarray) -> tuple[int, int]:
     """The same of any channel: a coarse sensor stands still between its steps, (0, 1) at least."""
     there, same = _repeats(values)
     length, first = _longest_run(same)
-    if not length:
-        return 0, 1
+    return _span(there, first, length) if length else (0, 1)
+
+
+def _span(there: np.ndarray, first: int, length: int) -> tuple[int, int]:
+    """First sample and length of a run of repeats among the samples that there are."""
     return int(there[first]), int(there[first + length] - there[first]) + 1
 
 
