@@ -56,6 +56,8 @@ class Row:
         Where something is missing, and whether a hidden law acts there.
     crowd
         How many more do the same as what leads than a tie prints.
+    beside
+        What the printed tie holds beside an accepted ``first``.
     accepted, wrong
         Of a pair: how many of the two were accepted, and how many that are not there.
     """
@@ -78,12 +80,17 @@ class Row:
     accepted: int = 0
     wrong: int = 0
     crowd: int = 0
+    beside: tuple[str, ...] = ()
     seconds: float = nan
 
     @property
     def visible(self) -> bool:
         """True where the hidden effect can be seen."""
         return self.kind is Kind.EFFECT and self.own_drop > VISIBLE
+
+    def offers(self, name: str) -> bool:
+        """True where a reader of the answer has a name before him: first, or in the printed tie."""
+        return name == self.first or name in self.beside
 
 
 def plain(row: Row) -> dict[str, Any]:
@@ -96,7 +103,8 @@ def row_again(kept: Mapping[str, Any]) -> Row:
     """The row of what :func:`plain` gave, whatever else was kept with it, also by older code."""
     known = {name: kept[name] for name in Row.__dataclass_fields__ if name in kept}
     numbers = {k: nan if v is None else v for k, v in known.items()}
-    return replace(Row(**numbers), kind=Kind(numbers["kind"]))
+    beside = tuple(known.get("beside", ()))
+    return replace(Row(**numbers), kind=Kind(numbers["kind"]), beside=beside)
 
 
 def table(rows: Sequence[Row]) -> str:
