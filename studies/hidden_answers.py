@@ -89,7 +89,7 @@ def row_of(task: Task, said: Answer) -> Row:
         balance=balance,
         balance_right=balance in bench.laws.get(case.hidden or "", ()),
         crowd=len(ranking[0].crowd),
-        beside=ranking[0].tied_with if ranking[0].accepted else (),
+        beside=said.beside,
     )
 
 

@@ -26,13 +26,11 @@ class Answer:
     """What a diagnosis said of one case.
 
     place       rank of the hidden effect, from 1; 0 where nothing of the catalogue was hidden
-    tied        the hidden effect leads the ranking or stands in the printed tie
     """
 
     case: Case
     diagnosis: Diagnosis
     place: int
-    tied: bool
 
     @property
     def named(self) -> str:
@@ -58,6 +56,17 @@ class Answer:
             return False
         tied = (name.partition("@")[0] for name in self.diagnosis.ranking[0].tied_with)
         return any(name in bench_of(self.case).always_there for name in tied)
+
+    @property
+    def beside(self) -> tuple[str, ...]:
+        """What the printed tie holds beside what leads; nothing where that is not accepted."""
+        leader = self.diagnosis.ranking[0]
+        return leader.tied_with if leader.accepted else ()
+
+    @property
+    def tied(self) -> bool:
+        """Whether the hidden effect leads the ranking or stands in the printed tie."""
+        return self.place == 1 or bench_of(self.case).public_name(self.case) in self.beside
 
     @property
     def right(self) -> bool:
@@ -94,7 +103,4 @@ def answer(
     order = [row.candidate.name for row in diagnosis.ranking]
     name = bench_of(case).public_name(case)
     place = order.index(name) + 1 if name in order else 0
-    leader = diagnosis.ranking[0]
-    printed = leader.accepted and name in leader.tied_with
-    tied = place == 1 or printed
-    return Answer(case, diagnosis, place, tied)
+    return Answer(case, diagnosis, place)
