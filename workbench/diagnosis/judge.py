@@ -18,13 +18,14 @@ A pair pays for the parameters of both, takes twice the share, and both sizes mu
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import isclose, isnan, log, sqrt
 
 import numpy as np
 
 from workbench.candidate import Candidate
-from workbench.diagnosis.refit import Refit, held_out_misfit, surplus
+from workbench.diagnosis.near_priors import left_near_priors
+from workbench.diagnosis.refit import Refit, surplus
 from workbench.diagnosis.result import Law, Ranked
 from workbench.diagnosis.scan import Profile
 from workbench.diagnosis.size import DISTINCT, distinct
@@ -50,6 +51,8 @@ CLOSE_DROP_SAME = 0.50  # the same for signatures that are one
 FAR_WORSE = 3.0  # times the misfit that is left of a recording: beyond, that one tells them apart
 LITTLE_LEFT = 0.05  # of a misfit: less is not compared
 LEAST_PROXY = 0.05  # of the misfit: less stands for nothing
+
+Left = Callable[[Problem, Refit], float]  # squared error that a rival leaves
 
 HELD_OUT_REASON = "does not predict the held-out recording better"
 SHARE_REASON = f"explains less than {LEAST_SHARE:.0%} of the misfit"
@@ -139,7 +142,12 @@ def _reasons_of_size(refit: Refit, candidate: Candidate) -> list[str]:
     return reasons
 
 
-def tie_group(problem: Problem, refits: list[Refit], profiles: dict[str, Profile]) -> list[Refit]:
+def tie_group(
+    problem: Problem,
+    refits: list[Refit],
+    profiles: dict[str, Profile],
+    left: Left = left_near_priors,
+) -> list[Refit]:
     """The leader and those that cannot be told from it, the leader first.
 
     A candidate is tied when its drop comes within a quarter of the best, or within half of it with
@@ -163,7 +171,7 @@ def tie_group(problem: Problem, refits: list[Refit], profiles: dict[str, Profile
     sound = [each for each in tied if not against[id(each)]] or tied[:LARGEST_TIE]
     tied = tied[: max(len(sound), LARGEST_TIE)]
     effects = [each for each in sound if each.candidate.name in profiles] or sound
-    leader = _leader(problem, effects)
+    leader = _leader(problem, effects, left)
     others = [each for each in tied if each is not leader]
     others.sort(key=lambda r: (r not in sound, -abs(_alignment_of(leader, r, profiles))))
     return [leader, *others]
@@ -198,19 +206,15 @@ def _far_worse(other: Refit, best: Refit) -> bool:
     return 1.0 - other.drop_train > most and theirs >= ours
 
 
-def _leader(problem: Problem, effects: Sequence[Refit]) -> Refit:
+def _leader(problem: Problem, effects: Sequence[Refit], left: Left) -> Refit:
     """Which of the tied leads; see :func:`tie_group`."""
     may_lead = [each for each in effects if predicts(each)] or effects
-    leader = max(may_lead, key=lambda each: _explained(problem, each))
+    if len(may_lead) == 1:
+        return may_lead[0]
+    leader = min(may_lead, key=lambda each: left(problem, each))
     closest = min(may_lead, key=left_held_out)
     leader = closest if _told_apart_held_out(closest, leader) else leader
     return next((each for each in may_lead if _leans_on(leader, each)), leader)
-
-
-def _explained(problem: Problem, each: Refit) -> float:
-    """Squared error, in units of the typical one, that goes away in both recordings together."""
-    held_out = 0.0 if isnan(each.drop_validation) else each.drop_validation
-    return each.drop_train * problem.misfit + held_out * held_out_misfit(problem.base_validation)
 
 
 def _told_apart_held_out(one: Refit, other: Refit) -> bool:
