@@ -18,6 +18,10 @@ from workbench.diagnosis.result import Diagnosis, Ranked
 
 SHOWN_RANKS = 12
 DROPS = "drop: share of the weighted misfit beyond noise that goes away, on either set"
+TIES = (
+    "tie: led by what leaves least of both sets where parameters stay near their priors, "
+    "or clearly least of the validation"
+)
 
 
 def ranking_text(found: Diagnosis) -> str:
@@ -43,7 +47,8 @@ def ranking_text(found: Diagnosis) -> str:
     head = ("", "effect", "drop train", "validation", "mod. index", "compensable", "size", "by", "")
     rest = len(found.ranking) - SHOWN_RANKS
     more = f"\n... and {rest} more, in the JSON" if rest > 0 else ""
-    return f"{columns(head, rows)}{more}\n{DROPS}"
+    tied = f"\n{TIES}" if found.ranking and found.ranking[0].tied_with else ""
+    return f"{columns(head, rows)}{more}\n{DROPS}{tied}"
 
 
 def sizes_text(row: Ranked) -> str:

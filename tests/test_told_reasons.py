@@ -162,3 +162,13 @@ def test_an_effect_that_comes_in_before_a_law_is_told_beside_the_law():
 
     assert _taken_instead(law).startswith(f"; {LEAK.name} passes every criterion")
     assert _taken_instead(alone) == _taken_instead(diagnosis()) == ""
+
+
+def test_a_tie_says_what_its_order_rests_on():
+    """The drops beside it may be larger further down."""
+    found = diagnosis()
+    leader = replace(found.ranking[0], tied_with=(LAG.name,))
+    tied = replace(found, ranking=(leader, *found.ranking[1:]))
+
+    assert "where parameters stay near their priors" in ranking_text(tied)
+    assert "near their priors" not in ranking_text(found)
