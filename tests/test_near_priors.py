@@ -14,7 +14,7 @@ from workbench.fitting.problem import pose
 from workbench.rig import load_rig
 
 AWAY = 3.0  # prior deviations that the best pressure of the surroundings lies off
-POWER = 0.01  # of the likelihood
+POWER = 1.0 / 400.0  # of the likelihood
 UNSURE = 30.0  # times as wide as the catalogue's: what lies off then shows in the force
 
 
@@ -39,7 +39,7 @@ def believing(rival, deviations):
     return replace(rival, fit=fit_windows(fit.windows, unknowns, fit.point))
 
 
-def test_it_is_the_least_of_a_likelihood_to_the_power_of_a_hundredth(problem, sound):
+def test_it_is_the_least_of_a_likelihood_to_a_power_far_below_one(problem, sound):
     """On a bench, which is linear in its parameters, a ridge regression has it in closed form."""
     rival = believing(sound, AWAY)
     fit = rival.fit
@@ -55,7 +55,7 @@ def test_it_is_the_least_of_a_likelihood_to_the_power_of_a_hundredth(problem, so
 
 
 def test_nuisances_that_bend_cost_though_the_refit_is_as_low(problem, sound):
-    """A pressure three deviations off costs nine in a refit, and a hundred times that here."""
+    """A pressure three deviations off costs nine in a refit, and far more than that here."""
     near, far = believing(sound, 0.0), believing(sound, AWAY)
     more = left_near_priors(problem, far) - left_near_priors(problem, near)
 
