@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from math import isfinite
 
 from studies.text import columns, number, percent, removed, spread
@@ -15,6 +15,7 @@ from workbench.diagnosis.judge import (
     share_removed,
 )
 from workbench.diagnosis.result import Diagnosis, Ranked
+from workbench.effect import Kind
 
 SHOWN_RANKS = 12
 DROPS = "drop: share of the weighted misfit beyond noise that goes away, on either set"
@@ -47,8 +48,14 @@ def ranking_text(found: Diagnosis) -> str:
     head = ("", "effect", "drop train", "validation", "mod. index", "compensable", "size", "by", "")
     rest = len(found.ranking) - SHOWN_RANKS
     more = f"\n... and {rest} more, in the JSON" if rest > 0 else ""
-    tied = f"\n{TIES}" if found.ranking and found.ranking[0].tied_with else ""
-    return f"{columns(head, rows)}{more}\n{DROPS}{tied}"
+    return f"{columns(head, rows)}{more}\n{DROPS}{_order_of_ties(found.ranking)}"
+
+
+def _order_of_ties(ranking: Sequence[Ranked]) -> str:
+    """What the order of a tie rests on, where effects that pass were compared."""
+    alike = ranking[0].alike if ranking else ()
+    passing = (row for row in ranking if row.accepted and row.kind is Kind.EFFECT)
+    return f"\n{TIES}" if any(row.candidate.name in alike for row in passing) else ""
 
 
 def sizes_text(row: Ranked) -> str:

@@ -1,6 +1,7 @@
 """What rivals leave where nuisances may hardly bend for them."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,10 +9,12 @@ from test_judgement import BARE, HELD_OUT, TRAIN
 
 from workbench.diagnosis.diagnose import silent
 from workbench.diagnosis.follow import follow
-from workbench.diagnosis.near_priors import left_near_priors
+from workbench.diagnosis.judge import tie_group
+from workbench.diagnosis.near_priors import hardly_moving, left_near_priors
 from workbench.fitting.gauss_newton import fit_windows
 from workbench.fitting.problem import pose
-from workbench.rig import load_rig
+from workbench.fitting.unknowns import nominal_unknowns
+from workbench.rig import default_rig, load_rig
 
 AWAY = 3.0  # prior deviations that the best pressure of the surroundings lies off
 POWER = 1.0 / 400.0  # of the likelihood
@@ -45,7 +48,8 @@ def test_it_is_the_least_of_a_likelihood_to_a_power_far_below_one(problem, sound
     fit = rival.fit
     r0, J = fit.derivatives.residual.ravel(), fit.derivatives.parameters.reshape(-1, 2)
     r0 = r0 - J @ fit.point.t
-    weights = np.sqrt(fit.unknowns.precision / POWER)
+    known = fit.unknowns.precision >= 1.0
+    weights = np.sqrt(np.where(known, fit.unknowns.precision / POWER, fit.unknowns.precision))
     t = np.linalg.lstsq(np.vstack([J, np.diag(weights)]), np.r_[-r0, 0.0, 0.0], rcond=None)[0]
     training = np.sum((r0 + J @ t) ** 2) + np.sum((weights * t) ** 2)
     held_out = problem.validated(replace(fit, point=replace(fit.point, t=t)))
@@ -61,6 +65,28 @@ def test_nuisances_that_bend_cost_though_the_refit_is_as_low(problem, sound):
 
     assert far.fit.cost - near.fit.cost < AWAY**2 + 0.1
     assert more > 5.0 * AWAY**2
+
+
+def test_what_bends_less_leads_a_tie_though_it_removes_less(problem, sound):
+    """By default: nobody has to ask for it."""
+    near, far = believing(sound, 0.0), believing(sound, AWAY)
+    cause = replace(far.candidate.cause, name="another")
+    far = replace(far, candidate=replace(far.candidate, cause=cause), drop_train=0.99)
+    near = replace(near, drop_train=0.98)
+
+    assert tie_group(problem, [far, near], {})[0] is near
+
+
+def test_what_was_added_and_what_is_always_there_is_held_no_closer():
+    """The size of a leak has no prior, and a few milliseconds of delay are in every fit."""
+    rig = default_rig("servo_drive")
+    leak = rig.plant.candidates["piston_leak"]
+    free = nominal_unknowns(rig.plant.at_null(leak), added=[leak])
+    fit = SimpleNamespace(unknowns=free, windows=SimpleNamespace(plant=rig.plant))
+    ratio = dict(zip(free.names, hardly_moving(fit, 0.1).precision / free.precision, strict=True))
+
+    assert ratio[leak.strength] == ratio["command_delay.delay_s"] == 1.0
+    assert ratio["slide.mass_kg"] == pytest.approx(100.0)
 
 
 def test_nothing_held_out_counts_nothing(problem, sound):

@@ -155,10 +155,11 @@ def tie_group(
     held-out recording too, unless one leaves several times as much of the misfit of either, as a
     fifth where the other leaves only noise, or fails to predict by more than a few held-out
     windows.  Among the tied those that pass every criterion come first, effects before parameters
-    that would lie far off what is known of them, and among these the one leads under which training
-    and held-out recordings together are likeliest: either alone orders rivals by what its few
-    events happen to show.  But where one leaves at least a fifth less of the held-out misfit, and
-    not in a few windows alone, that recording decides.  And where the leader needs more than is
+    that would lie far off what is known of them, and among these the one leads with the
+    least ``left`` of both recordings together, where nuisances may hardly bend for any: either
+    recording alone orders rivals by what its few events happen to show.  But where one leaves at
+    least a fifth less of the held-out misfit, and not in a few windows alone, that recording
+    decides.  And where the leader needs more than is
     usual of one that is always there and leaves hardly less than that one, the other leads.  Those
     that look most like the leader stand next to it: were it wrong, it would stand for one of them.
 

@@ -7,15 +7,18 @@ A fit therefore believes its windows more than they deserve, goes where a few of
 word, and predicts what it never saw worse than one that stayed near the priors.  Its minimum is the
 lowest of several valleys, and which one that is hangs on next to nothing.
 
-So each rival is fitted once more with its likelihood to the power 1/400, from where its refit
-ended: deviations of priors a twentieth as wide say the same.  What counts is
+So each rival is fitted once more with its likelihood to the power 1/400, which is to say with
+deviations of priors a twentieth as wide, by way of a quarter.  What counts is
 
     min over p, X0 of  chi2 + 400 |(p - p0) / s_p|^2 + |(x0 - guess) / s_x|^2   in training,
 
-and the squared error on what is held out with these parameters, no window counted too much.  The
-power is chosen: of thousands of effective samples as many say something of their own as the plant
-has small things of its own.  A tenth of the width orders the ties of study ``hidden-effects`` as
-well; a twentieth orders them the same whether a rig believes its parameters to 5 % or to 15 %.
+with p the nuisances, and the squared error on what is held out with them, no window counted too
+much.  What has no prior, as the size of the rival itself, stays free, and what is tolerated in
+every fit, as a few milliseconds of delay, keeps the width that it is tolerated to.
+
+The power is chosen: of thousands of effective samples as many say something of their own as the
+plant has small things of its own.  A tenth of the width orders the ties of study ``hidden-effects``
+as well; at a twentieth more of them keep their order where a rig believes its parameters to 15 %.
 
 Source: Gruenwald and van Ommen 2017, "Inconsistency of Bayesian inference for misspecified linear
 models, and a proposal for repairing it"; Miller and Dunson 2019, "Robust Bayesian inference via
@@ -24,16 +27,43 @@ coarsening".
 
 from __future__ import annotations
 
-from workbench.diagnosis.refit import ITERATIONS, Refit, bounded_squares
-from workbench.fitting.gauss_newton import fit_windows
-from workbench.fitting.problem import Problem
+from dataclasses import replace
 
-NEARER = 0.05  # of the deviations of the priors
+import numpy as np
+
+from workbench.diagnosis.refit import ITERATIONS, Refit, bounded_squares
+from workbench.fitting.continued import continued
+from workbench.fitting.costs import points_costs
+from workbench.fitting.gauss_newton import Fit, fit_windows
+from workbench.fitting.linearised import Point
+from workbench.fitting.problem import Problem
+from workbench.fitting.pulled_in import towards_priors
+from workbench.fitting.unknowns import Unknowns
+
+STAGES = (0.25, 0.05)  # widths of priors, of their own
+SHARES = (1.0, 0.3, 0.0)  # of the way that the nuisances have gone, to begin from
 
 
 def left_near_priors(problem: Problem, rival: Refit) -> float:
-    """Cost of a rival in both recordings near the priors; see the module's equation."""
-    unknowns = rival.fit.unknowns.loosened(NEARER)
-    fit = fit_windows(rival.fit.windows, unknowns, rival.fit.point, ITERATIONS)
+    """Cost of a rival in both recordings near the priors; see the module's equation.
+
+    Each stage begins where the one before ended, or nearer to the priors, as costs less.
+    """
+    windows, fit = rival.fit.windows, rival.fit
+    for nearer in STAGES:
+        unknowns = hardly_moving(rival.fit, nearer)
+        points = [Point(towards_priors(fit, share), fit.point.starts) for share in SHARES]
+        begun = points_costs(windows, unknowns, points).best
+        fit = fit_windows(windows, unknowns, begun, ITERATIONS)
+    fit = continued(fit, ITERATIONS)
     held_out = problem.validated(fit)
     return fit.cost + (float(bounded_squares(held_out).sum()) if held_out else 0.0)
+
+
+def hardly_moving(fit: Fit, nearer: float) -> Unknowns:
+    """The unknowns of a fit with priors ``nearer`` times as wide; see the module for which."""
+    unknowns, candidates = fit.unknowns, fit.windows.plant.candidates.values()
+    usual = {each.strength for each in candidates if each.cause.tolerated}
+    held = (unknowns.precision >= 1.0) & [name not in usual for name in unknowns.names]
+    precision = np.where(held, unknowns.precision / nearer**2, unknowns.precision)
+    return replace(unknowns, precision=precision)
