@@ -141,6 +141,7 @@ def _asked(problem: Problem, where: Where | None, progress: Progress) -> _Asked:
         progress("the prior fit is improved by what the refits found: once more")
         problem, followed = better, follow(better, where, progress, followed.refits)
     profiles = followed.profiles
+    progress("the order of what does the same")
     ranking = ranked(problem, profiles, followed.refits, followed.moved, followed.begun)
     ranking = with_pairs(problem, ranking, profiles, progress)
     law = _law(problem, ranking, profiles, where, progress)
