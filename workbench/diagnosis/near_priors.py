@@ -4,8 +4,8 @@ Rivals that cannot be told apart differ by how the nominal parameters bend for t
 too easily.  A likelihood counts every effective sample as evidence of its own; but what a model has
 otherwise than the plant, a dozen small things, is the same in all windows and averages out in none.
 A fit therefore believes its windows more than they deserve, goes where a few of them have the last
-word, and predicts what it never saw worse than one that stayed near the priors.  Its minimum is the
-lowest of several valleys, and which one that is hangs on next to nothing.
+word, and may predict what it never saw worse than one that stayed near the priors.  Its minimum is
+the lowest of several valleys, and which one that is hangs on next to nothing.
 
 So each rival is fitted once more with its likelihood to the power 1/400, which is to say with
 deviations of priors a twentieth as wide, by way of a quarter.  What counts is
