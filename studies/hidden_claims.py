@@ -117,10 +117,12 @@ def _widths(effects: Sequence[Row], wide: Sequence[Row], enough: Enough) -> Iter
     found = [(asked.get((r.plant, r.hidden, r.seed)), r) for r in wide]
     both = [(one, other) for one, other in found if one]
     same = [one.first == other.first for one, other in both]
+    seen = [holds for holds, (one, _) in zip(same, both, strict=True) if one.visible]
     offered = sum(a.offers(b.first) and b.offers(a.first) for a, b in both)
+    visible, tied = f"{sum(seen)} of {len(seen)}", f"each in the other's printed tie in {offered}"
     what = "the same first name with priors three times as wide"
     for claim in _share(what, same, 0.90, enough):
-        yield replace(claim, found=f"{claim.found}; each in the other's printed tie in {offered}")
+        yield replace(claim, found=f"{claim.found}; of visible ones {visible}; {tied}")
 
 
 def _laws(rows: Sequence[Row], enough: Enough) -> Iterator[Claim]:

@@ -19,7 +19,6 @@ QUICK_SEED = 1  # and of it every so many-th task of each plant and kind,
 QUICK_EVERY = 5
 SLOW = "gearbox"  # of which a diagnosis takes minutes: one
 LAW_SEED = 1  # each law once
-WIDTH_SEED = 1  # on the servo drive
 
 
 @dataclass(frozen=True)
@@ -90,11 +89,10 @@ def _weak() -> Iterator[Task]:
 
 
 def _widths() -> Iterator[Task]:
-    """One seed of the servo drive's effects once more."""
+    """All of the servo drive's effects once more."""
     truth = SERVO_DRIVE.truth
-    stored = read_cases(truth.stored).values()
-    for case in stored:
-        if case.seed == WIDTH_SEED and case.hidden in truth.hidden:
+    for case in read_cases(truth.stored).values():
+        if case.hidden in truth.hidden:
             yield Task(Kind.WIDTH, (case,))
 
 
