@@ -16,6 +16,7 @@ from workbench.diagnosis.scan import scan_from_priors
 from workbench.fitting.gauss_newton import fit_windows
 from workbench.fitting.linearised import Point
 from workbench.fitting.problem import pose
+from workbench.fitting.unknowns import Unknowns
 from workbench.rig import load_rig
 
 
@@ -26,7 +27,9 @@ def profile(name, drop):
 def from_priors(t, profiles, monkeypatch):
     """Names of what is refitted from the priors, the last unknown being without one."""
     monkeypatch.setattr(follow, "refit_from_priors", lambda problem, one: one.candidate.name)
-    unknowns = SimpleNamespace(precision=np.array([1.0, 1.0, 1e-4]))
+    wide, one = np.full(3, np.inf), np.ones(3)
+    precision = np.array([1.0, 1.0, 1e-4])
+    unknowns = Unknowns(("core", "damping", "added"), 0 * one, one, -wide, wide, precision)
     base = SimpleNamespace(point=SimpleNamespace(t=np.array(t)), unknowns=unknowns)
     problem = SimpleNamespace(base=base, misfit=100.0)
     return [*follow._from_priors(problem, profiles, silent)]

@@ -64,6 +64,6 @@ def hardly_moving(fit: Fit, nearer: float) -> Unknowns:
     """The unknowns of a fit with priors ``nearer`` times as wide; see the module for which."""
     unknowns, candidates = fit.unknowns, fit.windows.plant.candidates.values()
     usual = {each.strength for each in candidates if each.cause.tolerated}
-    held = (unknowns.precision >= 1.0) & [name not in usual for name in unknowns.names]
+    held = unknowns.with_prior & [name not in usual for name in unknowns.names]
     precision = np.where(held, unknowns.precision / nearer**2, unknowns.precision)
     return replace(unknowns, precision=precision)

@@ -32,7 +32,7 @@ def begun_anew(fit: Fit) -> Fit:
     """
     unknowns = fit.unknowns
     for _ in range(ROUNDS):
-        far = (np.abs(fit.point.t) > IMPLAUSIBLE) & (unknowns.precision >= 1.0)
+        far = (np.abs(fit.point.t) > IMPLAUSIBLE) & unknowns.with_prior
         if only_noise(fit) or not far.any():
             break
         tried = fitted_twice(fit.windows, unknowns, np.where(far, 0.0, fit.point.t))

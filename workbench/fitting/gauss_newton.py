@@ -257,7 +257,7 @@ def _damped_steps(
     """
     normal = normal_equations(at, unknowns, counted)
     H, g = normal.hessian, normal.gradient
-    longest = np.where(unknowns.precision < 1.0, LONGEST_FREE_STEP, LONGEST_STEP)
+    longest = np.where(unknowns.with_prior, LONGEST_STEP, LONGEST_FREE_STEP)
     steps = []
     for damping in DAMPINGS:
         dt = -np.linalg.solve(H + damping * np.diag(np.diag(H)), g) if len(g) else np.zeros(0)

@@ -38,7 +38,7 @@ def pulled_in(fit: Fit, iterations: int) -> Fit:
 
 def gone_far(fit: Fit, deviations: float = FAR) -> bool:
     """Whether a fit has taken a parameter further than so many deviations from its prior."""
-    return bool(np.any(np.abs(fit.point.t[_with_prior(fit)]) > deviations))
+    return bool(np.any(np.abs(fit.point.t[fit.unknowns.with_prior]) > deviations))
 
 
 def towards_priors(fit: Fit, share: float) -> np.ndarray:
@@ -47,8 +47,4 @@ def towards_priors(fit: Fit, share: float) -> np.ndarray:
     What was added has no prior, and stays.
     """
     t = fit.point.t
-    return fit.unknowns.clipped(np.where(_with_prior(fit), share * t, t))
-
-
-def _with_prior(fit: Fit) -> np.ndarray:
-    return fit.unknowns.precision >= 1.0
+    return fit.unknowns.clipped(np.where(fit.unknowns.with_prior, share * t, t))

@@ -36,9 +36,14 @@ class Unknowns:
         return len(self.names)
 
     @property
+    def with_prior(self) -> np.ndarray:
+        """True for what a prior holds, not for what was added, shape (n_p,)."""
+        return self.precision >= 1.0
+
+    @property
     def ends(self) -> tuple[np.ndarray, np.ndarray]:
         """Smallest and largest scaled unknowns: bounds, or ends of the reach, (n_p,) each."""
-        reach = np.where(self.precision >= 1.0, self.reach, np.inf)
+        reach = np.where(self.with_prior, self.reach, np.inf)
         lower, upper = ((each - self.prior) / self.scale for each in (self.lower, self.upper))
         return np.maximum(lower, -reach), np.minimum(upper, reach)
 
