@@ -14,8 +14,11 @@ from test_pairs import strokes
 
 from workbench.diagnosis import diagnose as diagnosis
 from workbench.diagnosis.improve import improve
+from workbench.diagnosis.improvement import Change, Stage
 from workbench.diagnosis.judge import HELD_OUT_REASON
 from workbench.diagnosis.passes import Passes, Removal
+from workbench.diagnosis.rounds import Rounds, leaves_less
+from workbench.fitting.errors import per_sample
 from workbench.rig import load_rig
 
 BARE = 'name = "bench"\nplant = "cylinder_bench"\n[values]\n"chamber.area" = "518.7 mm^2"\n'
@@ -69,6 +72,22 @@ def test_two_that_come_in_together_are_told_and_thought_over_like_a_pair(rig, si
     assert all("100% in validation" in note for note in found.rig.notes)
     assert [each.candidate.name for each in found.removals] == list(found.kept)
     assert {each.candidate.name for each in found.swaps} == set(found.kept)
+
+
+def test_no_step_is_credited_with_what_another_fit_of_the_model_before_it_gives(rig):
+    """What a diagnosis begins with is no higher than the bar of the step before, nor lower."""
+    found = improve(rig, [recorded(1, 0.5), recorded(3, 0.5)], [recorded(2, 0.5)])
+    began = [(each.base, each.base_validation) for each in found.diagnoses]
+
+    assert {each.change for each in found.budget[2 : len(began) + 1]} == {Change.ADDED}
+    for fits, stage in zip(began, found.budget[1:], strict=False):  # then second thoughts
+        assert not leaves_less(fits, (stage.train, stage.validation))
+
+    errors = [*map(per_sample, began[1])]
+    for worse, told in (((2.0, 2.0), errors), ((2.0, 0.9), None), ((1.01, 1.01), None)):
+        stage = Stage("+ it", *np.multiply(worse, errors).tolist())
+        again = Rounds(rig, budget=(found.budget[0], stage)).fitted_again(found.diagnoses[1])
+        assert again.budget == (found.budget[0], Stage("+ it", *told) if told else stage)
 
 
 def refused_ahead(rig, train, held_out):

@@ -22,7 +22,7 @@ from workbench.diagnosis.diagnose import Progress, diagnose, silent
 from workbench.diagnosis.improvement import Change, Improvement
 from workbench.diagnosis.law_addition import accept_law, add_law
 from workbench.diagnosis.passes import Kept, Passes
-from workbench.diagnosis.rounds import Rounds, forward
+from workbench.diagnosis.rounds import Rounds, forward, leaves_less
 from workbench.fitting.errors import Errors, errors_of, per_sample
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.posterior import Moved, fitted_rig, moved_parameters
@@ -31,8 +31,6 @@ from workbench.recording import Recording
 from workbench.rig import Rig
 
 __all__ = ["Addition", "Improvement", "accept", "add", "add_law", "improve"]
-
-LESS = 0.98  # of the error that is left: a fit that leaves no less is no step of its own
 
 
 def improve(
@@ -155,8 +153,6 @@ def _improvement(
         final, fit, held_out = done.steps[-1].rig, done.law.fit or fit, done.law.validation
     elif done.kept and done.kept.steps:
         fit, held_out = _last_fit(done, done.kept)
-        if fit is not done.kept.fit:
-            done = done.marked("all of it", fit, held_out, Change.FITTED)
         final = fitted_rig(assembled(done.rig, done.kept.steps), fit)
     if final is not done.rig:
         steps = (*done.steps, *(done.kept.steps if done.kept else ()))  # rivals that came in too
@@ -191,19 +187,13 @@ def _improvement(
 
 
 def _last_fit(done: Rounds, kept: Kept) -> tuple[Fit, Fit | None]:
-    """The fit of what is kept: that of the last diagnosis where it leaves less on both sets.
-
-    A refit weighs errors as the model without its effect made them, and where that effect was large
-    it ends before what is left counts for anything.  The diagnosis that then found nothing to add
-    had fitted the same model, weighed by its own errors.
-    """
+    """The fit of what is kept: that of the last diagnosis where it leaves less on both sets."""
     last, found = done.diagnoses[-1], (kept.fit, kept.validation)
     added = last.ranking and last.ranking[0].accepted  # after that fit
     if added or [s.candidate for s in kept.steps] != [s.candidate for s in done.steps]:
         return found
     again = (last.base, last.base_validation)
-    less = (per_sample(b) < LESS * per_sample(a) for a, b in zip(found, again, strict=True))
-    return again if all(less) else found
+    return again if leaves_less(again, [per_sample(fit) for fit in found]) else found
 
 
 def _counted_from(rig: Rig, added: Collection[str], row: Moved) -> Moved:

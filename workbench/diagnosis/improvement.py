@@ -25,7 +25,6 @@ class Change(Enum):
     DROPPED = "dropped"
     SWAPPED = "swapped"
     LAW = "empirical"
-    FITTED = "fitted again"
 
 
 class Stage(NamedTuple):
@@ -78,7 +77,7 @@ class Improvement:
         Before and after with standard deviations, of all that the final fit moved.
     budget
         Errors per sample step by step: the rig as it came, its parameters refitted, then each
-        change.
+        change; where the next diagnosis fits the same model again and lower, that fit's.
     stopped
         True where the user stopped it after at least one finished round.
     fit, validation_fit

@@ -48,6 +48,7 @@ from workbench.rig import Rig
 
 MOST_ROUNDS = 8
 PROMISES = 0.5  # of the misfit in training: an effect that removes less is not tried further
+LESS = 0.98  # of the error that is left: a fit that leaves no less is as good as it was
 
 
 @dataclass(frozen=True)
@@ -90,6 +91,19 @@ class Rounds:
         done = replace(done, came=errors_of(*came))
         done = done.marked(Change.START.value, *came, Change.START)
         return done.marked(Change.REFITTED.value, *refitted, Change.REFITTED)
+
+    def fitted_again(self, diagnosis: Diagnosis) -> Rounds:
+        """The same, the last bar as low as the next diagnosis begins.
+
+        So no step is credited with what another fit of the model before it would give.
+        """
+        *earlier, last = self.budget
+        fits = (diagnosis.base, diagnosis.base_validation)
+        if not leaves_less(fits, (last.train, last.validation)):
+            return self
+        train, validation = map(per_sample, fits)
+        lower = last._replace(train=train, validation=validation)
+        return replace(self, budget=(*earlier, lower))
 
     def looked(self, candidate: Candidate, outcome: str) -> Rounds:
         """The same with what came of trying an effect for one round more."""
@@ -152,7 +166,7 @@ def _round(done: Rounds, asked: _Asked) -> Rounds:
     """One diagnosis, and what it adds; the same steps where that is nothing."""
     current = assembled(done.rig, done.steps)
     diagnosis = asked.diagnosis(current)
-    done = done.told(diagnosis)
+    done = done.told(diagnosis).fitted_again(diagnosis)
     if diagnosis.contradicted:
         asked.progress(f"stopped: {diagnosis.sentence}")
         return done
@@ -168,6 +182,17 @@ def _round(done: Rounds, asked: _Asked) -> Rounds:
     except KeyboardInterrupt:
         asked.progress(f"stopped beside {hopeful.candidate.name}: what is finished stays")
         return replace(done, stopped=True)
+
+
+def leaves_less(fits: Sequence[Fit | None], errors: Sequence[float]) -> bool:
+    """Whether fits on both sets leave clearly less than these errors per sample.
+
+    A refit weighs errors as the model without its effect made them, and where that effect was large
+    it ends before what is left counts for anything.  The next diagnosis fits the same model once
+    more, weighed by its own errors.
+    """
+    pairs = zip(fits, errors, strict=True)
+    return all(per_sample(fit) < LESS * error for fit, error in pairs)
 
 
 def _accepts(diagnosis: Diagnosis) -> bool:
