@@ -31,7 +31,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from workbench.diagnosis.refit import ITERATIONS, Refit, bounded_squares
+from workbench.diagnosis.refit import ITERATIONS, Refit, bounded_error
 from workbench.fitting.continued import continued
 from workbench.fitting.costs import points_costs
 from workbench.fitting.gauss_newton import Fit, fit_windows
@@ -57,7 +57,7 @@ def left_near_priors(problem: Problem, rival: Refit) -> float:
         fit = fit_windows(windows, unknowns, begun, ITERATIONS)
     fit = continued(fit, ITERATIONS)
     held_out = problem.validated(fit)
-    return fit.cost + (float(bounded_squares(held_out).sum()) if held_out else 0.0)
+    return fit.cost + (bounded_error(held_out) if held_out else 0.0)
 
 
 def hardly_moving(fit: Fit, nearer: float) -> Unknowns:

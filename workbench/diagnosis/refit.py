@@ -188,13 +188,12 @@ def held_out_drop(before: Fit | None, after: Fit | None) -> float:
     """
     if before is None or after is None:
         return float("nan")
-    less = np.sum(bounded_squares(before)) - np.sum(bounded_squares(after))
-    return float(less) / held_out_misfit(before)
+    return (bounded_error(before) - bounded_error(after)) / held_out_misfit(before)
 
 
 def held_out_misfit(fit: Fit | None) -> float:
     """Squared error beyond noise of what is held out, no window counted too much; 0 without any."""
-    return beyond_noise(float(np.sum(bounded_squares(fit))), fit.windows) if fit else 0.0
+    return beyond_noise(bounded_error(fit), fit.windows) if fit else 0.0
 
 
 def surplus(one: Fit, other: Fit) -> float:
@@ -203,13 +202,18 @@ def surplus(one: Fit, other: Fit) -> float:
     Windows are a sample of what may be recorded: sum d / sqrt(n var d), with d their differences.
     One alone says nothing of chance: 0.
     """
-    more = np.sum(bounded_squares(other) - bounded_squares(one), axis=0)
+    more = np.sum(_bounded_squares(other) - _bounded_squares(one), axis=0)
     if len(more) < 2:
         return 0.0
     return float(np.sum(more) / max(np.sqrt(len(more)) * np.std(more), 1e-300))
 
 
-def bounded_squares(fit: Fit) -> np.ndarray:
+def bounded_error(fit: Fit) -> float:
+    """Squared error of a fit, no window counted more than an outlying one."""
+    return float(np.sum(_bounded_squares(fit)))
+
+
+def _bounded_squares(fit: Fit) -> np.ndarray:
     """Squared error of each output and window up to that of an outlying one, (n_y, n_windows)."""
     windows = fit.windows
     squares = (fit.residual**2).sum(axis=2)
