@@ -81,18 +81,25 @@ def _write_mat(hybrid: HybridModel, path: Path) -> None:
 def save_next_recording(rig: Rig, asked: NextRecording | None, folder: Path, command: str) -> None:
     """next_recording.pdf and .svg with what each rival would record, and what is to be played.
 
-    next_recording_how.txt says how that is done, with the speed map of the loop.
-    next_recording.csv holds commands and reference in the columns and units of the rig's files,
-    in place of the curves that stand beside other figures.  Nothing where nothing can be played.
+    next_recording.csv stands in place of the curves that stand beside other figures; see
+    :func:`save_commands`.  Nothing where nothing can be played.
     """
     from studies.figures.next_recording import next_recording_figure
-    from studies.text_of_next_recording import instructions
-    from workbench.reading.command_writer import write_commands
 
     if asked is None or not asked.predicted:
         return
     save(next_recording_figure(asked), folder / "next_recording", command)
-    commands = asked.predicted[asked.separates[0]]
-    write_commands(rig, commands, folder / "next_recording.csv", asked.reference)
-    with whole_file(folder / "next_recording_how.txt") as unfinished:
+    save_commands(rig, asked, folder / "next_recording.csv")
+
+
+def save_commands(rig: Rig, asked: NextRecording, target: Path) -> None:
+    """Commands and reference in the columns and units of the rig's files, and how to play them.
+
+    The latter, with the speed map of the loop, is the file beside it whose name ends in _how.txt.
+    """
+    from studies.text_of_next_recording import instructions
+    from workbench.reading.command_writer import write_commands
+
+    write_commands(rig, asked.predicted[asked.separates[0]], target, asked.reference)
+    with whole_file(target.with_name(f"{target.stem}_how.txt")) as unfinished:
         unfinished.write_text(instructions(asked), encoding="utf-8")

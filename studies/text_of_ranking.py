@@ -73,6 +73,8 @@ def _remark(row: Ranked, found: Diagnosis) -> str:
         return f"would pass, but {leader.candidate.name} explains more"
     if found.law:
         return "would pass, but the law explains clearly more"
+    if found.too_short:
+        return "passes, but too little was fitted to name it"
     if found.contradicted:
         return "passes, but recording and rig contradict each other"
     return f"accepted, tied with {', '.join(row.tied_with)}" if row.tied_with else "accepted"

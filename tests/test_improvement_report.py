@@ -9,6 +9,7 @@ import pytest
 from test_improvement import UNITS, improved, rig, sets  # noqa: F401
 from test_next_recording import asked, demo_rig, rivals  # noqa: F401
 
+from studies.export import save_commands
 from studies.improvement_text import improvement_document
 from studies.report.improvement import _next_recording, report_improvement
 
@@ -39,6 +40,18 @@ def test_what_the_last_diagnosis_leaves_open_comes_with_commands(
     assert asked.what in section.table and section.figures == ("next_recording",)
     assert (tmp_path / "figures" / "next_recording.csv").read_text().startswith("time_s,command_V")
     assert (tmp_path / "figures" / "next_recording.svg").is_file()
+    assert section.text == ("figures/next_recording.csv holds the reference of the loop below",)
+
+    alone = replace(open_end, next_recording=replace(asked, conduct=None))
+    (section,) = _next_recording(replace(found, diagnoses=(alone,)), tmp_path, "a command")
+    assert section.text == ("figures/next_recording.csv holds the commands, ready to play",)
+
+
+def test_commands_come_with_how_to_play_them_under_their_own_name(demo_rig, asked, tmp_path):
+    save_commands(demo_rig, asked, tmp_path / "tonight.csv")
+
+    assert (tmp_path / "tonight.csv").read_text().startswith("time_s,command_V")
+    assert "speed of slide.position" in (tmp_path / "tonight_how.txt").read_text()
 
 
 def test_the_document_of_an_improvement_holds_its_last_diagnosis(improved):

@@ -169,4 +169,5 @@ def test_nothing_is_named_of_a_single_stroke(folder):
 
     assert said["verdict"] == "recording_too_weak" and said["effect"] is None
     assert said["sentence"].endswith("s were fitted, too little to tell what is missing")
+    assert said["too_short"] is True
     assert said["after"]["train"] == {} and said["next_recording"]["what"]

@@ -122,6 +122,8 @@ def test_a_blind_candidate_says_so_after_its_reasons():
     row = replace(refused(SHARE_REASON, train=0.1, held_out=0.1), visible_from=inf)
     text = diagnosis_text(replace(diagnosis(Verdict.NOTHING_MISSING), ranking=(row,)), UNITS)
     assert "(10.0 % as the mean of both sets); this recording cannot show it" in text
+    (told,) = diagnosis_document(replace(diagnosis(), ranking=(row,)), UNITS)["ranking"]
+    assert told["visible_from"] is None and told["blind"] is True
 
 
 def test_what_is_named_and_does_not_act_where_an_unknown_input_helps_most_is_told():
@@ -154,6 +156,11 @@ def test_what_passes_beside_a_law_or_a_contradiction_is_not_told_as_accepted():
     assert "would pass, but the law explains clearly more" in outlawed
     assert "passes, but recording and rig contradict each other" in withdrawn
     assert "accepted" not in outlawed + withdrawn
+
+    short = replace(diagnosis(), contradicted=True, too_short=True)
+    assert "passes, but too little was fitted to name it" in ranking_text(short)
+    assert "contradict" not in ranking_text(short)
+    assert diagnosis_document(short, UNITS)["too_short"] is True
 
 
 def test_an_effect_that_comes_in_before_a_law_is_told_beside_the_law():

@@ -25,7 +25,7 @@ from studies.page.missing_term import MissingTerm
 from studies.page.session import Role, Session, recordings
 from studies.page.verbs import diagnose_action, require_train, with_diagnosed, with_saved_commands
 from studies.text import percent
-from studies.text_of_next_recording import conduct_lines
+from studies.text_of_next_recording import next_recording_text
 from studies.text_of_ranking import reasons, sizes_text
 
 if TYPE_CHECKING:
@@ -93,10 +93,9 @@ class MissingTab:
         shown = found.ranking[:SHOWN]
         self._bars.children = [_bars(shown)] if shown else []
         put(self._table, _table(shown))
-        apart = ", ".join(asked.separates) if asked else ""
-        told = f"{escape(asked.what)}; it tells apart {escape(apart)}." if asked else ""
-        how = "".join(f"<p>{escape(each)}</p>" for each in (conduct_lines(asked) if asked else ()))
-        put(self._next, told and f"<h2>What to record next</h2><p>{told}</p>{how}")
+        lines = next_recording_text(asked).splitlines() if asked else []
+        told = "".join(f"<p>{escape(each)}</p>" for each in lines)
+        put(self._next, told and f"<h2>What to record next</h2>{told}")
 
     def _diagnose(self) -> None:
         page = self._page

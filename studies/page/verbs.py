@@ -119,7 +119,7 @@ def with_diagnosed(session: Session, found: Diagnosed) -> Session:
 
 
 def with_saved_commands(session: Session, target: Path) -> Session:
-    """The commands of the next recording written as a file to be played.
+    """The commands of the next recording written as a file to be played, and how beside it.
 
     Raises
     ------
@@ -127,19 +127,17 @@ def with_saved_commands(session: Session, target: Path) -> Session:
         If it cannot be written there.
     """
     from studies.command_line.files import writable
-    from workbench.reading.command_writer import write_commands
+    from studies.export import save_commands
 
-    asked = session.diagnosed.next_recording
     writable(target)
-    write_commands(session.now.rig, asked.predicted[asked.separates[0]], target, asked.reference)
+    save_commands(session.now.rig, session.diagnosed.next_recording, target)
     train = paths(session.of(Role.TRAINING))
     words = command("diagnose", session.now.rig_file, *train, *_sets(session), "--figures",
                     str(target.parent))  # fmt: skip
     lines = (
-        "from workbench.reading.command_writer import write_commands",
-        "asked = diagnosis.next_recording",
-        f"write_commands(rig, asked.predicted[asked.separates[0]], {str(target)!r}, "
-        "asked.reference)",
+        "from pathlib import Path",
+        "from studies.export import save_commands",
+        f"save_commands(rig, diagnosis.next_recording, Path({str(target)!r}))",
     )
     return did(session, Action(words, "\n".join(lines)))
 

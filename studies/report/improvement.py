@@ -50,5 +50,7 @@ def _next_recording(found: Improvement, folder: Path, command: str) -> list[Sect
     if asked is None or not asked.predicted:
         return []
     save_next_recording(found.rig, asked, folder / FIGURES, command)
-    notes = (f"{FIGURES}/next_recording.csv holds the commands, ready to play",)
+    looped = asked.conduct is not None and asked.conduct.loop is not None
+    what = "the reference of the loop below" if looped else "the commands, ready to play"
+    notes = (f"{FIGURES}/next_recording.csv holds {what}",)
     return [Section("Next recording", notes, instructions(asked), ("next_recording",))]

@@ -220,5 +220,6 @@ def _concluded(
         next_recording=recommended(problem, verdict, ranking, progress),
         evidence=evidence,
         contradicted=short,
+        too_short=short,
         strained=strained(problem.base),
     )

@@ -263,7 +263,7 @@ class Diagnosis:
     ``evidence`` says what that data is worth.
     ``next_recording`` is there where the verdict leaves a question open.
     ``contradicted`` is True where recording and rig contradict each other, or hardly anything was
-    fitted: whatever the ranking accepts then is no effect to be added.
+    fitted (``too_short``): whatever the ranking accepts then is no effect to be added.
     ``strained`` are parameters that the prior fit takes far from what is known of them: suspects.
     """
 
@@ -281,6 +281,7 @@ class Diagnosis:
     next_recording: NextRecording | None = None
     evidence: Evidence = Evidence.VALIDATION
     contradicted: bool = False
+    too_short: bool = False
     strained: tuple[Moved, ...] = ()
 
     @property
