@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from studies.plain import plain
 from studies.shift_cases import case_deviations, mean_deviations
+from studies.text_of_law import law_document
 from studies.text_of_next_recording import conduct_document
 from workbench.diagnosis.result import told
 from workbench.units import public_name, si_unit
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from linearize.regions import Validity
     from studies.closed_loop_check import Check
     from workbench.comparison.compare import Comparison, RecordingComparison
-    from workbench.diagnosis.result import Diagnosis, Law, NextRecording, Ranked, Where
+    from workbench.diagnosis.result import Diagnosis, NextRecording, Ranked, Where
     from workbench.fitting.errors import SignalError
     from workbench.fitting.posterior import Moved
     from workbench.plant import Candidate
@@ -255,30 +256,6 @@ def _where(where: Where) -> Document:
             {"regime": name, "share_of_error": plain(share)}
             for name, share in where.by_regime.items()
         ],
-    }
-
-
-def law_document(law: Law) -> Document:
-    """An empirical law: balance, terms, the ranges in which it was seen, and what adds it."""
-    return {
-        "balance": law.balance,
-        "terms": {
-            public_name(name): {
-                "value": plain(size.value),
-                "unit": si_unit(name),
-                "std": plain(size.deviation),
-            }
-            for name, size in law.terms.items()
-        },
-        "ranges": {
-            public_name(name): {"low": plain(low), "high": plain(high), "unit": si_unit(name)}
-            for name, (low, high) in law.ranges.items()
-        },
-        "error_drop_train": plain(told(law.drop_train)),
-        "error_drop_validation": plain(told(law.drop_validation)),
-        "text": law.text,
-        "kind": "empirical",
-        "add": [step.candidate.name for step in law.steps],
     }
 
 

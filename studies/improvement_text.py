@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from studies.documents import Document, diagnosis_document, errors, law_document, moved_document
+from studies.documents import Document, diagnosis_document, errors, moved_document
 from studies.plain import plain
 from studies.text import columns, number, removed
-from studies.text_of_results import errors_over, law_text, moved_text, windows_text
+from studies.text_of_law import law_document, law_text
+from studies.text_of_results import errors_over, moved_text, windows_text
 from workbench.diagnosis.improvement import Change
 from workbench.diagnosis.result import told
 

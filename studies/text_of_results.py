@@ -7,6 +7,7 @@ from math import isfinite
 from typing import TYPE_CHECKING
 
 from studies.text import columns, number, percent, removed, shown, spread
+from studies.text_of_law import HOW, law_text
 from studies.text_of_next_recording import next_recording_text
 from studies.text_of_ranking import imitated_text, ranking_text
 from workbench.diagnosis.result import LEAST_GAIN
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
     from workbench.diagnosis.addition import Addition
     from workbench.diagnosis.missing_term import Dependence, Loop
-    from workbench.diagnosis.result import Diagnosis, Law, Where
+    from workbench.diagnosis.result import Diagnosis, Where
     from workbench.fitting.errors import SignalError
     from workbench.fitting.fit import FitReport
     from workbench.fitting.gauss_newton import Fit
@@ -43,7 +44,7 @@ def diagnosis_text(found: Diagnosis, unit_of: Mapping[str, str]) -> str:
     parts += [f"warning: {warning}" for warning in found.warnings]
     parts += ["", ranking_text(found), *(imitated_text(found.named) if found.named else ())]
     if found.law:
-        parts += ["", law_text(found.law)]
+        parts += ["", law_text(found.law), HOW]
     if found.where:
         parts += ["", where_text(found)]
     parts += strained_text(found)
@@ -53,21 +54,6 @@ def diagnosis_text(found: Diagnosis, unit_of: Mapping[str, str]) -> str:
     if found.next_recording:
         parts += ["", next_recording_text(found.next_recording)]
     return "\n".join(parts)
-
-
-def law_text(law: Law) -> str:
-    """What an empirical law explains, and where it was seen."""
-    ranges = (
-        f"{public_name(name)} {shown(low, name, 3)} to {shown(high, name, 3)}"
-        for name, (low, high) in law.ranges.items()
-    )
-    names = " ".join(f'"{step.candidate.name}"' for step in law.steps)
-    return (
-        f"law (empirical, not a physical effect): {names}; "
-        f"drop train {removed(law.drop_train)}, validation {removed(law.drop_validation)}; "
-        f"seen for {', '.join(ranges)}\n"
-        "`workbench add RIG law --fit ...` takes it, `improve --law` does where nothing else helps"
-    )
 
 
 def where_text(found: Diagnosis) -> str:

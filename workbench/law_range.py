@@ -23,7 +23,7 @@ MARGIN = 0.02  # of a range: noise alone goes that far beyond it
 
 
 def seen_in(plant: Plant, recordings: Iterable[Recording]) -> dict[str, tuple[float, float]]:
-    """Range in SI of each recorded output, and of the speed of bodies that a law acts on.
+    """Range in SI of each recorded output, and of the speeds and commands that drive a law.
 
     ``plant`` has the laws in it.  A speed that was not recorded is the slope of the position.
     """
@@ -39,13 +39,15 @@ def seen_in(plant: Plant, recordings: Iterable[Recording]) -> dict[str, tuple[fl
 
 
 def _followed(plant: Plant, recording: Recording) -> dict[str, np.ndarray]:
-    """What has a range, sample by sample: outputs, then places and speeds of bodies."""
-    carried = recording.channels
-    moved = [law.body for law in laws_of(plant) if isinstance(law, EmpiricalForce)]
-    driving = [f"{body}.{what}" for body in moved for what in ("position_m", "velocity_m_s")]
-    wanted = (*plant.measured, *plant.optional_outputs, *driving)
+    """What has a range, sample by sample: outputs, then what drives a law, as far as recorded."""
+    carried, laws = recording.channels, laws_of(plant)
+    places = [f"{law.body}.position_m" for law in laws if isinstance(law, EmpiricalForce)]
+    moved = {getattr(law, "body", None): None for law in laws}
+    sent = [getattr(law, "command", None) for law in laws]
+    speeds = [f"{body}.velocity_m_s" for body in moved]
+    wanted = (*plant.measured, *plant.optional_outputs, *places, *speeds, *filter(None, sent))
     rows = {n: carried[n] for n in wanted if n in carried and np.isfinite(carried[n]).any()}
-    for body in moved:
+    for body in filter(None, moved):
         values = recorded_speed(recording, body)
         if values is not None:
             rows.setdefault(f"{body}.velocity_m_s", values)

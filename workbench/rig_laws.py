@@ -135,7 +135,8 @@ def with_laws(plant: Plant, names: Iterable[str]) -> Plant:
 
 def quantities(plant: Plant) -> dict[str, str]:
     """Full names of what may have a range, by public name: outputs, inputs and states."""
-    inputs = (signal.name for signal in (*plant.measured_inputs, *plant.optional_inputs))
+    signals = (*plant.commands, *plant.measured_inputs, *plant.optional_inputs)
+    inputs = (signal.name for signal in signals)
     names = (*plant.measured, *plant.optional_outputs, *inputs, *plant.state_list)
     return {public_name(name): name for name in names}
 

@@ -23,7 +23,14 @@ from workbench.effect import (
     form,
     strength,
 )
-from workbench.effects.law_features import Feature, Here, product, size_of, written
+from workbench.effects.law_features import (
+    Feature,
+    Here,
+    counted_in,
+    product,
+    size_of,
+    written,
+)
 
 SOURCE = "diagnosis.md 1.9: sparse law of one balance"
 CONSTANT = "constant"  # the driver of what nothing drives
@@ -52,6 +59,9 @@ class EmpiricalForce(Effect):
     Source: diagnosis.md 1.9.
     """
 
+    formula: ClassVar[str] = ""  # as it is told, with a for the coefficient
+    counted_in: ClassVar[tuple[str, ...]] = ()  # forms in whose size its factors count
+
     body: str
 
     def force_n(self, velocity_m_s: Expression, position_m: Expression) -> Expression:
@@ -68,6 +78,7 @@ class SquareDrag(EmpiricalForce):
     """F = -a v |v|."""
 
     causes = _cause("v|v|", "quadratic_n_s2_m2", Balance.MOMENTUM)
+    formula = "F = -a v |v|"
     quadratic_n_s2_m2: Expression = strength(typical=300.0, lower=-30.0, upper=1e5)
 
     def force_n(self, velocity_m_s: Expression, position_m: Expression) -> Expression:
@@ -76,9 +87,10 @@ class SquareDrag(EmpiricalForce):
 
 @dataclass(frozen=True, kw_only=True)
 class CubicDrag(EmpiricalForce):
-    """F = -b v^3."""
+    """F = -a v^3."""
 
     causes = _cause("v^3", "cubic_n_s3_m3", Balance.MOMENTUM)
+    formula = "F = -a v^3"
     cubic_n_s3_m3: Expression = strength(typical=500.0, lower=-15.0, upper=1e5)
 
     def force_n(self, velocity_m_s: Expression, position_m: Expression) -> Expression:
@@ -87,9 +99,11 @@ class CubicDrag(EmpiricalForce):
 
 @dataclass(frozen=True, kw_only=True)
 class PlacedDrag(EmpiricalForce):
-    """F = -c v |x - x_m|, with x_m the middle of the recorded stroke."""
+    """F = -a v |x - x_m|, with x_m the middle of the recorded stroke."""
 
     causes = _cause("v|x - mid|", "placed_viscous_n_s_m2", Balance.MOMENTUM)
+    formula = "F = -a v |x - mid|"
+    counted_in = ("middle_m",)
     placed_viscous_n_s_m2: Expression = strength(typical=500.0, lower=-1e5, upper=1e5)
     middle_m: Expression = form(0.0, lower=-inf)
 
@@ -100,9 +114,11 @@ class PlacedDrag(EmpiricalForce):
 
 @dataclass(frozen=True, kw_only=True)
 class CurvedForce(EmpiricalForce):
-    """F = e (x - x_m)^2, with x_m the middle of the recorded stroke."""
+    """F = a (x - x_m)^2, with x_m the middle of the recorded stroke."""
 
     causes = _cause("(x - mid)^2", "curved_n_m2", Balance.MOMENTUM)
+    formula = "F = a (x - mid)^2"
+    counted_in = ("middle_m",)
     curved_n_m2: Expression = strength(typical=2000.0, lower=-1e6, upper=1e6)
     middle_m: Expression = form(0.0, lower=-inf)
 
@@ -117,6 +133,9 @@ class EmpiricalFlow(Effect):
     Source: diagnosis.md 1.9.
     """
 
+    formula: ClassVar[str] = ""
+    counted_in: ClassVar[tuple[str, ...]] = ()
+
     chamber: str
 
     def flow_kg_s(self, now: Conditions) -> Expression:
@@ -129,9 +148,10 @@ class EmpiricalFlow(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class ConstantFlow(EmpiricalFlow):
-    """mdot = w."""
+    """mdot = a."""
 
     causes = _cause(CONSTANT, "constant_kg_s", Balance.MASS)
+    formula = "mdot = a"
     constant_kg_s: Expression = strength(typical=1e-4, lower=-1e-2, upper=1e-2)
 
     def flow_kg_s(self, now: Conditions) -> Expression:
@@ -140,9 +160,10 @@ class ConstantFlow(EmpiricalFlow):
 
 @dataclass(frozen=True, kw_only=True)
 class PressureFlow(EmpiricalFlow):
-    """mdot = w p / p_s, with the pressure of the supply."""
+    """mdot = a p / p_s, with the pressure of the supply."""
 
     causes = _cause("p/p_s", "pressure_kg_s", Balance.MASS)
+    formula = "mdot = a p/p_s"
     supply: str = "supply"
     pressure_kg_s: Expression = strength(typical=1e-4, lower=-1e-2, upper=1e-2)
 
@@ -152,9 +173,10 @@ class PressureFlow(EmpiricalFlow):
 
 @dataclass(frozen=True, kw_only=True)
 class SpeedFlow(EmpiricalFlow):
-    """mdot = w |v| with the speed of the body that closes the chamber."""
+    """mdot = a |v| with the speed of the body that closes the chamber."""
 
     causes = _cause("|v|", "speed_kg_m", Balance.MASS)
+    formula = "mdot = a |v|"
     body: str
     speed_kg_m: Expression = strength(typical=5e-4, lower=-1e-1, upper=1e-1)
 
@@ -186,6 +208,16 @@ class ScaledForce(EmpiricalForce):
     def causes(self) -> tuple[Cause, ...]:
         return _cause(written(self.feature), "size_n", Balance.MOMENTUM)
 
+    @property
+    def formula(self) -> str:
+        """As it is told, everything in its sizes."""
+        return f"F = {'-' if self.direction < 0.0 else ''}a {written(self.feature)}"
+
+    @property
+    def counted_in(self) -> tuple[str, ...]:
+        """Forms in whose size its factors count."""
+        return counted_in(self.feature)
+
     def terms(self, now: Conditions) -> Iterator[Force]:
         moved, across_pa = now[self.body], 0.0
         if self.chambers:
@@ -212,7 +244,7 @@ class ScaledDrag(ScaledForce):
 
 @dataclass(frozen=True, kw_only=True)
 class ScaledFlow(EmpiricalFlow):
-    """mdot = w g(v / v_0, (p - p_amb) / p_0, (u - u_0) / U), in sizes of the recordings.
+    """mdot = a g(v / v_0, (p - p_amb) / p_0, (u - u_0) / U), in sizes of the recordings.
 
     The command is what reaches the valve; ``rest`` and ``span`` are its u_0 and U in its own unit.
     ``outside`` is the part with p_amb.
@@ -233,6 +265,16 @@ class ScaledFlow(EmpiricalFlow):
     @property
     def causes(self) -> tuple[Cause, ...]:
         return _cause(written(self.feature), "size_kg_s", Balance.MASS)
+
+    @property
+    def formula(self) -> str:
+        """As it is told, everything in its sizes."""
+        return f"mdot = a {written(self.feature)}"
+
+    @property
+    def counted_in(self) -> tuple[str, ...]:
+        """Forms in whose size its factors count."""
+        return counted_in(self.feature)
 
     def flow_kg_s(self, now: Conditions) -> Expression:
         gauge_pa = now[self.chamber].pressure_pa - now[self.outside].pressure_pa

@@ -2,8 +2,8 @@
 
 Everything is counted in sizes of the recordings, so that a coefficient is a force in N, or a flow
 in kg/s, where the recordings reached: v in the largest speed, s = -1 to 1 over the stroke (sines
-and cosines of its whole, half and double length), a pressure or a difference of two in the largest
-one, and a command as a share of its range to either side.
+and cosines of its whole, half and double length), a difference of two pressures in the largest one,
+one above ambient in the largest absolute one, and a command as a share of its range to either side.
 
 Source: diagnosis.md 1.9.  Its rate of the command is not among them: it needs a state of its own,
 and is what the catalogue knows as lag and delay.
@@ -86,11 +86,22 @@ class Factor(Enum):
 
 
 Feature = tuple[Factor, ...]  # none, one, or the product of two
+_SIZES = (  # forms of a law that a factor is counted in, by what stands in how it is written
+    ("v", ("speed_m_s",)),
+    ("x", ("middle_m", "stroke_m")),
+    ("p", ("pressure_pa",)),
+)
 
 
 def written(feature: Feature) -> str:
     """A feature as a law writes it: ``v sign v``; ``1`` where it is constant."""
     return " ".join(factor.value for factor in feature) or "1"
+
+
+def counted_in(feature: Feature) -> tuple[str, ...]:
+    """Names of the forms that a feature is counted in."""
+    letters = {letter for factor in feature for letter in factor.value.replace("pi", "")}
+    return tuple(form for letter, forms in _SIZES if letter in letters for form in forms)
 
 
 def product(feature: Feature, here: Here) -> Expression:
