@@ -9,6 +9,7 @@ from studies.plain import plain
 from studies.shift_cases import case_deviations, mean_deviations
 from studies.text_of_law import law_document
 from studies.text_of_next_recording import conduct_document
+from workbench.comparison.noise import NoiseSource
 from workbench.diagnosis.result import told
 from workbench.units import public_name, si_unit
 
@@ -58,7 +59,7 @@ def _compared(each: RecordingComparison) -> Document:
         },
         "noise": {
             public_name(name): {
-                "value": plain(noise.value),
+                "value": None if noise.source is NoiseSource.NONE else plain(noise.value),
                 "unit": si_unit(name),
                 "from": noise.source.value,
             }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import nan
+from math import isfinite, nan
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
 import numpy as np
@@ -68,7 +68,7 @@ def _errors(each: RecordingComparison) -> str:
                 horizon,
                 shown(error.rmse, name),
                 number(error.fit_percent, 3),
-                shown(error.noise, name, 2),
+                shown(error.noise if isfinite(error.rmse) else nan, name, 2),
                 number(error.chi2_per_sample, 3),
             )
             for name in each.measured

@@ -1,12 +1,16 @@
 """Comparisons with sensors that saturate, and with slow ones on a fast clock."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 from test_comparison import NOISE, PRESSURE, measured
 
-from workbench.comparison import compare
+from studies.documents import comparison_document
+from studies.figures.comparison import overlay_figure
+from studies.text_of_comparison import comparison_text
+from workbench.comparison import compare, horizons
 from workbench.comparison.compare import FREE_RUN, ONE_STEP, WINDOW
 from workbench.consistency import examined
 from workbench.consistency.findings import Weight
@@ -64,3 +68,30 @@ def test_time_in_which_nothing_was_recorded_is_told_and_belongs_to_no_regime(dri
     (told,) = examined(drive, silent)
     assert told.weight is Weight.NOTICE and told.channel.count(", ") == len(outputs) - 1
     assert examined(drive, recording) == ()
+
+
+@pytest.mark.filterwarnings("error:All-NaN")
+def test_a_silent_sensor_has_no_noise_in_table_and_document(drive):
+    """It stood there with 1e-17 bar, and its figure warned of a range of nothing."""
+    recording = measured(drive)
+    channels = {**recording.channels, PRESSURE: np.full(len(recording), np.nan)}
+    with pytest.warns(RecordingWarning):
+        found = compare(drive, [replace(recording, channels=channels, noise={})])
+    silent, other = (f"{part}.pressure" for part in ("chamber_a", "chamber_b"))
+    (told,) = comparison_document(found)["recordings"]
+
+    assert f"{silent}_pa" == PRESSURE
+    assert told["noise"][silent]["value"] is None and told["noise"][other]["value"] > 0.0
+    assert "e-1" not in comparison_text(found)
+    assert not any(silent in note and "thousandth" in note for note in found.recordings[0].notes)
+    overlay_figure(found.recordings[0]).draw_without_rendering()
+
+
+def test_a_recording_with_too_many_windows_says_how_many_are_run(drive, monkeypatch):
+    recording = measured(drive)
+    notes = compare(drive, [recording]).recordings[0].notes
+    monkeypatch.setattr(horizons, "cut_windows", partial(horizons.cut_windows, most=2))
+    few = compare(drive, [recording]).recordings[0].notes
+
+    assert not any(note.startswith("windows:") for note in notes)
+    assert any(note.endswith("are run, evenly over the recording") for note in few)

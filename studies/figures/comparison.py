@@ -99,7 +99,7 @@ def _draw_overlay(axes: Axes, each: RecordingComparison, name: str) -> None:
             drawn = thinned(each.time_s, to_people(each.simulated[horizon][name]))
             axes.plot(*drawn, linestyle=style, color=colour, label=horizon)
     axes.set_ylabel(labelled(name).replace(" (", "\n("))
-    if FREE_RUN in each.simulated:
+    if FREE_RUN in each.simulated and np.isfinite(measured).any():
         _hold_range(axes, measured)
 
 

@@ -28,7 +28,7 @@ from workbench.filter_passes import FilterResult, filter_pass, recording_filter
 from workbench.fitting.errors import in_units
 from workbench.fitting.start_states import refit_starts
 from workbench.fitting.window_length import window_length_s
-from workbench.fitting.windows import TooShortError, Windows, cut_windows
+from workbench.fitting.windows import TooShortError, Windows, cut_windows, window_firsts
 from workbench.plant import Plant
 from workbench.plant_filter import PlantFilter
 from workbench.recording import Recording
@@ -65,10 +65,18 @@ def foretold(course: Course, noise: Mapping[str, float]) -> tuple[dict[str, Rows
         notes.append(f"no windows: {error}")
     else:
         found[WINDOW], unsaid = _windows(windows, paths)
-        notes += unsaid
+        notes += [*unsaid, *_thinned(windows)]
     if free:
         found[FREE_RUN] = {name: free[name] for name in plant.measured}
     return found, notes
+
+
+def _thinned(windows: Windows) -> list[str]:
+    """In words how many windows of a long recording are run, if not all of them."""
+    (recording,) = windows.recordings
+    there = len(window_firsts(recording, windows.length))
+    run = len(windows)
+    return [f"windows: {run} of {there} are run, evenly over the recording"] if run < there else []
 
 
 def lost(recording: Recording, ahead: Rows) -> list[str]:

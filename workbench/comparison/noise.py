@@ -28,6 +28,7 @@ STILL_SHARE = 0.02  # of the blocks: fewer still ones are chance
 SAME_NOISE = 1.3  # ratio of two estimates from which on they disagree
 FEWEST = BLOCK + 3  # samples for one block of third differences
 ASSUMED_SHARE = 1e-3  # of the range, where nothing shows
+SMALLEST = 1e-12  # in SI: divides nothing where nothing is recorded
 
 
 class NoiseSource(Enum):
@@ -39,6 +40,7 @@ class NoiseSource(Enum):
     UNCLEAR = "not told from motion"
     SHORT = "the smallest step between two samples"
     ASSUMED = "a thousandth of the range"
+    NONE = "nothing recorded"
 
 
 @dataclass(frozen=True)
@@ -76,8 +78,8 @@ def _noise_of(recording: Recording, name: str) -> Noise:
         (value,) = measured_noise([recording], [name]).values()
     except NoNoiseError:
         seen = recording[name][np.isfinite(recording[name])]
-        value = max(ASSUMED_SHARE * float(np.ptp(seen)) if len(seen) else 0.0, 1e-12)
-        return Noise(name, value, NoiseSource.ASSUMED)
+        value = max(ASSUMED_SHARE * float(np.ptp(seen)) if len(seen) else 0.0, SMALLEST)
+        return Noise(name, value, NoiseSource.ASSUMED if len(seen) else NoiseSource.NONE)
     if name in recording.noise:
         return Noise(name, value, NoiseSource.GIVEN)
     return Noise(name, value, _source(recording, name, value))

@@ -55,9 +55,13 @@ class Residual:
 
 
 def residual_of(recording: Recording, error: np.ndarray, noise: float) -> Residual:
-    """Spectrum and autocorrelation of an error (n,), NaN where there is none."""
-    dt = recording.sample_time_s
-    stretches = [*_stretches(recording, error)]
+    """Spectrum and autocorrelation of an error (n,), NaN where there is none.
+
+    Of a sensor slower than the clock of its recording by its own samples.
+    """
+    every = _every(error)
+    dt = every * recording.sample_time_s
+    stretches = [*_stretches(recording, error, every)]
     frequency_hz, density = spectrum(stretches, dt)
     correlation, pairs = autocorrelation(stretches, _lags(dt, stretches))
     return Residual(
@@ -109,10 +113,17 @@ def _lags(sample_time_s: float, stretches: list[np.ndarray]) -> int:
     return min(wanted, max(map(len, stretches), default=1) - 1)
 
 
-def _stretches(recording: Recording, error: np.ndarray) -> Iterator[np.ndarray]:
-    """The error between holes and ends of pieces."""
+def _every(error: np.ndarray) -> int:
+    """How many samples of the clock lie between two that are there."""
+    apart = np.diff(np.flatnonzero(np.isfinite(error)))
+    return int(np.median(apart)) if len(apart) else 1
+
+
+def _stretches(recording: Recording, error: np.ndarray, every: int) -> Iterator[np.ndarray]:
+    """Every so many-th error between holes and ends of pieces, from the first that is there."""
     for first, piece in zip(recording.starts, recording.pieces, strict=True):
-        inside = error[first : first + len(piece)]
+        whole = error[first : first + len(piece)]
+        inside = whole[int(np.argmax(np.isfinite(whole))) :: every]
         edges = np.flatnonzero(np.diff(np.isfinite(inside))) + 1
         for part in np.split(inside, edges):
             if len(part) and np.isfinite(part[0]):
