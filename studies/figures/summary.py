@@ -9,6 +9,7 @@ import numpy as np
 from linearize.standard import POSITION
 from studies.figures.style import BLUE, GREY, ORANGE, PAGE_IN, new_figure, styled, thinned
 from workbench.comparison.compare import WINDOW
+from workbench.diagnosis.result import told
 from workbench.fitting.windows import WINDOW_S
 from workbench.units import display_scale, display_unit, public_name
 
@@ -40,7 +41,7 @@ def _draw_ranking(axes: Axes, found: Diagnosis) -> None:
     rows = found.ranking[:BEST]
     places = np.arange(len(rows))
     axes.set_yticks(places, [row.candidate.name.replace("@", "\n@") for row in rows])
-    drops = [100.0 * max(row.drop_train, 0.0) for row in rows]
+    drops = [100.0 * max(told(row.drop_train), 0.0) for row in rows]
     axes.barh(places, drops, 0.6, color=[BLUE] + [GREY] * (len(rows) - 1))
     axes.invert_yaxis()
     axes.set_xlabel("drop of the misfit (%)")
