@@ -5,6 +5,8 @@ from __future__ import annotations
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from studies.plain import plain
 from studies.text import columns, number, shown
 from workbench.units import display_unit, public_name, si_unit, suffix
@@ -17,7 +19,11 @@ SPEED = {"m": "velocity_m_s", "rad": "velocity_rad_s"}  # of a position by its s
 TOLD_STARTS = 3  # of recordings
 LAW = (
     "speed dr/dt + w (r - y), limited to plus and minus `fastest` and given by the speed map, "
-    "renewed every `update_s`; within `rest_within` of a resting reference the resting command"
+    "renewed every `update_s`; within `rest_within` of a resting reference the resting command; "
+    "without a reference the loop is off and the command is the resting one"
+)
+LOOP_OFF = (
+    "where the file has no reference (nan) the loop is off and the command is the resting one"
 )
 OPEN_LOOP = "the commands of the file alone, played without that loop, drift away"
 
@@ -33,7 +39,7 @@ def next_recording_text(asked: NextRecording) -> str:
 
 
 def conduct_lines(asked: NextRecording) -> list[str]:
-    """Where it starts, which stops it comes to and what gives the commands, a line each."""
+    """Where it starts, which stops it comes to, what gives the commands and when, a line each."""
     known = asked.conduct
     if known is None:
         return []
@@ -48,6 +54,8 @@ def conduct_lines(asked: NextRecording) -> list[str]:
         lines.append(f"it comes to stops: {met}, as predicted")
     if known.loop:
         lines.append(_loop(known.loop))
+    if any(np.isnan(row).any() for row in asked.reference.values()):
+        lines.append(LOOP_OFF)
     return lines
 
 

@@ -86,8 +86,13 @@ def start_loop(position_m: np.ndarray) -> SimpleNamespace:
 
 
 def loop_command(loop: Loop, memory: SimpleNamespace, reference_m, speed_m_s, position_m):
-    """Command in volt from this sample's reference and reading; updates the memory."""
-    error = reference_m - position_m
+    """Command in volt from this sample's reference and reading; updates the memory.
+
+    Without a reference (NaN), or without its speed next to that, the loop rests.
+    """
+    off = np.isnan(reference_m + speed_m_s)
+    error = np.where(off, 0.0, reference_m - position_m)
+    speed_m_s = np.where(off, 0.0, speed_m_s)
     memory.speed += 0.12 * ((position_m - memory.last) / 1e-3 - memory.speed)
     memory.last = position_m.copy()
     band = np.where(memory.resting, 2.5, 1.0) * loop.rest_m

@@ -62,7 +62,8 @@ def played(
 ) -> Table:
     """What the true drive of a case records of commands, or of a reference in its own loop, (n,).
 
-    The loop is that of the other recordings, with their unknown dead zone, not the rehearsal's.
+    The loop is that of the other recordings, with their unknown dead zone, not the rehearsal's; it
+    rests where there is no reference (NaN).
     """
     drives = [drive_of(case)]
     generators = [generator(case.hidden, case.seed, "next noise")]

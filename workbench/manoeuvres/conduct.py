@@ -14,12 +14,13 @@ from math import isfinite
 
 import numpy as np
 
-from workbench.manoeuvres.limits import SPEED_SAMPLES, Limits, stops_of
+from workbench.manoeuvres.limits import Limits
 from workbench.manoeuvres.rehearse import SpeedMap, bandwidth_rad_s, rest_within, update_s
+from workbench.manoeuvres.stops import near_stop, stops_of
 from workbench.plant import Plant
 from workbench.recording import Recording
 
-NEAR = 3e-3  # of the stroke: closer to a stop a body comes to it, whether it touches it or not
+APPROACH_S = 10e-3  # before a stop, over which a speed is taken: predictions have no noise
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,8 @@ class Contact:
 @dataclass(frozen=True)
 class Loop:
     """The position loop: v = dr/dt + w (r - y), and the command that gives this speed.
+
+    Without a reference it is off, and the command rests.
 
     Attributes
     ----------
@@ -128,7 +131,7 @@ def _first(values: np.ndarray) -> float:
 def _contacts(output: str, plant: Plant, predicted: Sequence[Recording]) -> list[Contact]:
     """The stops that an output comes to."""
     stops = stops_of(plant, output)
-    near = NEAR * (stops[1] - stops[0])
+    near = near_stop(stops)
     if not isfinite(near):
         return []
     found = []
@@ -145,5 +148,5 @@ def _approaches(room: np.ndarray, near: float, sample_time_s: float) -> list[flo
     """Speeds at which ``room``, what is left to a stop at each sample, falls below ``near``."""
     close = room < near
     met = np.flatnonzero(close[1:] & ~close[:-1]) + 1
-    before = np.maximum(met - SPEED_SAMPLES, 0)
+    before = np.maximum(met - max(round(APPROACH_S / sample_time_s), 1), 0)
     return [float(v) for v in np.abs(room[met] - room[before]) / ((met - before) * sample_time_s)]

@@ -58,13 +58,20 @@ def three_holds(limits: Limits, share: float) -> Play:
 
 
 def shut_and_wait(limits: Limits, share: float) -> Play:
-    """Go to a place, then give the resting command and wait; twice."""
+    """Go to a place, then give the resting command and wait; twice.
+
+    While it waits there is no reference: a loop that still acted would hide what drifts.
+    """
     time_s = limits.time_s
     half_s = time_s[-1] / 2.0
     place = levels(time_s, np.array([0.3, 0.7]), half_s, _move_s(limits))
     play = followed(limits, place, share)
     waits = time_s % half_s > LEAD_S + 2.0 * _move_s(limits)
-    return replace(play, commands=np.where(waits, opened(limits, 0.0 * time_s), play.commands))
+    return replace(
+        play,
+        commands=np.where(waits, opened(limits, 0.0 * time_s), play.commands),
+        reference=np.where(waits, np.nan, play.reference),
+    )
 
 
 def _move_s(limits: Limits) -> float:

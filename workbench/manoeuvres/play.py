@@ -22,7 +22,7 @@ class Play:
     commands
         Shape (n_u, n); NaN where a position loop is to give them.
     reference
-        Of each axis, shape (n_axes, n), in SI.
+        Of each axis, shape (n_axes, n), in SI; NaN where its loop is off.
     words
         What a person does, where the limits do not let it be what its manoeuvre says.
     """

@@ -6,8 +6,9 @@ The loop gives the command that moves the plant at the speed it asks for,
 
 with the speed map of the fitted plant from a batch of constant commands: dead zones and unequal
 directions are jumped over.  Close to a resting reference it gives the resting command, as a person
-stops the hunting of a drive with stiction.  Where rivals are compared each runs in a loop of its
-own: a loop hides what tells them apart unless the commands are compared too (diagnosis.md 1.8).
+stops the hunting of a drive with stiction, and so it does without a reference.  Where rivals are
+compared each runs in a loop of its own: a loop hides what tells them apart unless the commands are
+compared too (diagnosis.md 1.8).
 """
 
 from __future__ import annotations
@@ -128,15 +129,18 @@ def rest_within(axis: Axis) -> float:
 def _loop(
     limits: Limits, axis: Axis, speeds: SpeedMap, reference: np.ndarray, y: np.ndarray, first: int
 ) -> np.ndarray:
-    """The command of one axis until the next update, for every play, shape (n_plays,)."""
+    """The command of one axis until the next update, for every play, shape (n_plays,).
+
+    Where a reference ends before the next update it is followed as one that rests.
+    """
     step_s = update_s(limits)
     later = min(first + BLOCK, reference.shape[1] - 1)
-    rate = (reference[:, later] - reference[:, first]) / step_s
+    rate = np.nan_to_num(reference[:, later] - reference[:, first]) / step_s
     error = reference[:, first] - y
     wanted = rate + bandwidth_rad_s(limits) * error
     given = speeds.command_for(np.clip(wanted, -axis.speed, axis.speed))
     still = np.abs(rate) < 1e-6 * (axis.high - axis.low) / step_s
-    rests = (np.abs(error) < rest_within(axis)) & still
+    rests = ((np.abs(error) < rest_within(axis)) & still) | np.isnan(reference[:, first])
     nominal = limits.commands[limits.axes.index(axis)].nominal
     return np.where(rests, nominal, given)
 
