@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 
 from studies.documents import Document, diagnosis_document, errors, moved_document
 from studies.plain import plain
-from studies.text import columns, number, removed
+from studies.text import columns, number, removed, spread
 from studies.text_of_law import law_document, law_text
 from studies.text_of_results import errors_over, moved_text, windows_text
 from workbench.diagnosis.improvement import Change
 from workbench.diagnosis.result import told
+from workbench.units import public_name
 
 if TYPE_CHECKING:
     from workbench.diagnosis.improvement import Improvement, Stage
@@ -20,6 +21,14 @@ if TYPE_CHECKING:
     from workbench.fitting.errors import Errors
 
 CAME, REFITTED, END = (Change.START.value, "refitted", "in the end")
+UNCHANGED = "nothing is added: the rig file is as it came; `workbench fit` refits its parameters"
+STOPPED = "stopped by the user: what was finished stays"
+USED_UP = "no round was left, and the last one added something: improve the rig file once more"
+LEFT_OUT = (
+    "passes every criterion on top of what is kept, so no law is taken; it is not added: improve "
+    "the rig file once more"
+)
+LOWERED = "each row as low as the next diagnosis fits the same model"
 FREE_RUNS = (
     "free runs over whole recordings (no judge where positions integrate: the right effect can "
     "make them worse until the next one is there):"
@@ -33,9 +42,10 @@ def improvement_text(found: Improvement, unit_of: Mapping[str, str]) -> str:
         (stage.label, _change(stage), number(stage.train), number(stage.validation))
         for stage in found.budget
     ]
-    parts = [columns(head, rows), ""]
+    parts = [columns(head, rows), *_lowered(found), ""]
     for k, diagnosis in enumerate(found.diagnoses, start=1):
         parts += [f"diagnosis {k}: {diagnosis.sentence}{_taken_instead(diagnosis)}"]
+        parts += [f"  it warned then: {warning}" for warning in found.warned_then(diagnosis)]
         parts += [each.sentence for each in found.ahead if each.after == k]
     parts += [f"warning: {warning}" for warning in found.warnings]
     parts += thoughts_text(found)
@@ -49,7 +59,25 @@ def improvement_text(found: Improvement, unit_of: Mapping[str, str]) -> str:
             free = errors_over(free_states(found), unit_of)
             parts += ["", FREE_RUNS, free]
         parts += ["", moved_text(found.parameters)]
+    parts += ["", *told] if (told := endings(found)) else []
     return "\n".join(parts)
+
+
+def endings(found: Improvement) -> list[str]:
+    """What is to be known of the rig file that it ends with, a sentence each."""
+    told = [STOPPED] if found.stopped else []
+    told += [USED_UP] if found.used_up else []
+    told += [f"{found.left_out} {LEFT_OUT}"] if found.left_out else []
+    told += [] if found.kept else [UNCHANGED]
+    for row in found.tolerated:
+        size = spread(row.after, row.deviation, row.name)
+        told += [f"the rig file also takes {public_name(row.name)} = {size}, which every fit may"]
+    return told
+
+
+def _lowered(found: Improvement) -> list[str]:
+    """Whose fit a row of the budget may be."""
+    return [LOWERED] if any(stage.change is Change.ADDED for stage in found.budget) else []
 
 
 def _taken_instead(found: Diagnosis) -> str:
@@ -134,6 +162,7 @@ def improvement_document(found: Improvement, unit_of: Mapping[str, str]) -> Docu
         ),
         "ahead": [each.sentence for each in found.ahead],
         "warnings": list(found.warnings),
+        "endings": endings(found),
         "removals": [
             {
                 "effect": each.candidate.name,

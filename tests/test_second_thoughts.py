@@ -5,12 +5,14 @@ from test_diagnosis import bench, coulomb, nothing
 from test_improvement import BARE, steps_of
 
 from studies.improvement_text import improvement_text
+from workbench.diagnosis import addition
 from workbench.diagnosis import improve as improvement
 from workbench.diagnosis import passes as passing
 from workbench.diagnosis.diagnose import diagnose, silent
 from workbench.diagnosis.improve import improve
 from workbench.diagnosis.passes import Passes
 from workbench.diagnosis.rounds import Rounds
+from workbench.diagnosis.settle import settled_leader
 from workbench.rig import load_rig
 
 SETS = [bench(1, coulomb, 5.0), bench(3, coulomb, 5.0, 1e5)], [bench(2, coulomb, 5.0, 4e5)]
@@ -43,3 +45,47 @@ def test_what_is_left_alone_is_asked_against_the_rig_as_it_came(rig, monkeypatch
     assert all(each.dropped and each.reasons for each in found.removals)
     assert found.kept == () and found.rig is rig
     assert "constant_force" in improvement_text(found, {"rod.force": "rod.force_n"})
+
+
+def test_what_is_needed_is_asked_after_what_needs_it(rig, monkeypatch):
+    """Where stiction goes, what stands only because stiction needs it is asked too."""
+    kept = steps_of(rig, SETS, "coulomb_friction", "stiction", "constant_force")
+    done = Rounds(rig, kept=kept, steps=kept.steps).told(diagnose(rig, *SETS))
+    monkeypatch.setattr(passing, "reasons_against", lambda *asked: ("brings nothing",))
+    found = improvement._thought_over(done, *SETS, silent)
+
+    asked = {each.candidate.name: each for each in found.removals}
+    assert [*asked] == ["stiction", "coulomb_friction", "constant_force"]
+    assert all(each.dropped for each in asked.values())
+    assert all(each.reasons == ("brings nothing",) for each in asked.values())
+
+
+def test_the_order_of_asking_is_that_of_coming_in_where_none_needs_another(rig):
+    kept = steps_of(rig, SETS, "coulomb_friction", "viscous_friction", "stiction")
+    needed, other, needing = kept.steps
+    passes = Passes(rig, *SETS, {}, silent)
+
+    assert passes.in_turn((needed, other)) == (needed, other)
+    assert passes.in_turn(kept.steps) == (other, needing, needed)
+    assert passes.in_turn((needing, needed, other)) == (needing, needed, other)
+
+
+def test_a_rival_that_takes_a_place_has_its_size_settled_like_any_addition(rig, monkeypatch):
+    """Its refit weighs errors as the model without it made them, and stops short."""
+    wrong = steps_of(rig, SETS, "viscous_friction", "constant_force")
+    passes = Passes(rig, *SETS, {"viscous_friction": diagnose(rig, *SETS)}, silent)
+    asked = []
+
+    def settled(fit, candidate):
+        asked.append((fit, candidate.name))
+        return settled_leader(fit, candidate)
+
+    monkeypatch.setattr(addition, "settled_leader", settled)
+    tried, better = passes.swaps(wrong, wrong.steps[0])
+    ((refitted, name),) = asked
+
+    assert tried[-1].replaced and name == "coulomb_friction" == tried[-1].rival.name
+    assert tried[-1].addition is better.steps[-1]
+    assert better.fit is better.steps[-1].fit is not refitted
+    assert better.validation is better.steps[-1].validation_fit
+    assert better.fit.windows.scale.max() < 0.5 * refitted.windows.scale.max()

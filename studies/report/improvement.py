@@ -38,10 +38,22 @@ def report_improvement(found: Improvement, folder: Path, command: str) -> Path:
         figures |= drawn
     sections += _next_recording(found, folder, command)
     for number, step in enumerate(found.steps, start=1):
-        title = f"Addition {number}: {step.candidate.name}"
+        title = f"Addition {number}: {step.candidate.name}{_fate(found, step.candidate.name)}"
         sections.append(Section(title, step.rig.notes[-1:], addition_text(step, units)))
+    for swap in found.swaps:
+        if (step := swap.addition) is not None:
+            title = f"Swapped in: {swap.rival.name} for {swap.candidate.name}"
+            sections.append(Section(title, step.rig.notes[-1:], addition_text(step, units)))
     save_all(figures, folder / FIGURES, command)
     return write_report(folder, f"Improvement of {found.rig.name}", command, sections)
+
+
+def _fate(found: Improvement, name: str) -> str:
+    """What the second thoughts made of an addition, behind its name; nothing where it stays."""
+    if any(each.dropped and each.candidate.name == name for each in found.removals):
+        return ", dropped later"
+    rivals = (s.rival.name for s in found.swaps if s.replaced and s.candidate.name == name)
+    return next((f", later replaced by {rival}" for rival in rivals), "")
 
 
 def _next_recording(found: Improvement, folder: Path, command: str) -> list[Section]:

@@ -34,6 +34,8 @@ from workbench.recording import Recording
 from workbench.rig import Rig
 from workbench.rig_laws import is_law
 
+ALIKE_SHOWN = 3  # names of what a recording does not tell from what was added
+
 
 @dataclass(frozen=True)
 class Addition:
@@ -41,6 +43,7 @@ class Addition:
 
     ``evidence`` says what its errors on held-out recordings are worth, ``against`` which criteria
     of acceptance it fails: whoever adds an effect by name may know more than the recordings.
+    ``alike`` is what its diagnosis did not tell it from.
     """
 
     rig: Rig
@@ -54,6 +57,7 @@ class Addition:
     validation_fit: Fit | None = field(repr=False)
     evidence: Evidence = Evidence.VALIDATION
     against: tuple[str, ...] = ()
+    alike: tuple[str, ...] = ()
 
 
 def add(
@@ -98,9 +102,13 @@ def with_objections(step: Addition, against: tuple[str, ...]) -> Addition:
     """The addition with the criteria that it fails, in its note too."""
     if not against:
         return step
-    *before, last = step.rig.notes
-    told = f"{last}; added by name, a diagnosis would refuse it: {', '.join(against)}"
-    return replace(step, rig=replace(step.rig, notes=(*before, told)), against=against)
+    told = f"added by name, a diagnosis would refuse it: {', '.join(against)}"
+    return replace(noted(step, f"{step.rig.notes[-1]}; {told}"), against=against)
+
+
+def noted(step: Addition, note: str) -> Addition:
+    """The addition with another note of its own."""
+    return replace(step, rig=replace(step.rig, notes=(*step.rig.notes[:-1], note)))
 
 
 def refitted_addition(rig: Rig, problem: Problem, found: Refit, evidence: Evidence) -> Addition:
@@ -157,8 +165,11 @@ def accept(rig: Rig, diagnosis: Diagnosis) -> Addition:
 
 
 def addition_of(rig: Rig, diagnosis: Diagnosis, row: Ranked) -> Addition:
-    """A refitted row of a ranking added to the diagnosed rig as it was fitted there."""
-    return addition(
+    """A refitted row of a ranking added to the diagnosed rig as it was fitted there.
+
+    Its note says what does the same to these recordings: the rig file says one cause, they do not.
+    """
+    step = addition(
         rig,
         diagnosis.before,
         row.candidate,
@@ -167,6 +178,22 @@ def addition_of(rig: Rig, diagnosis: Diagnosis, row: Ranked) -> Addition:
         (row.drop_train, row.drop_validation),
         diagnosis.evidence,
     )
+    note = f"{step.rig.notes[-1]}{alike_text(row.alike)}"
+    return replace(noted(step, note), alike=row.alike)
+
+
+def alike_text(names: Sequence[str]) -> str:
+    """What something was not told apart from, at the end of a note; nothing without names."""
+    if not names:
+        return ""
+    more = f" and {len(names) - ALIKE_SHOWN} more" if len(names) > ALIKE_SHOWN else ""
+    return f"; not told apart from {', '.join(names[:ALIKE_SHOWN])}{more}"
+
+
+def falls(share: float, unseen: float, evidence: Evidence) -> str:
+    """How much of the misfit goes away in training and held out, in words."""
+    trained, held = f"{told(share):.0%}", f"{told(unseen):.0%}"
+    return f"weighted misfit {trained} smaller in training, {held} in {evidence.value}"
 
 
 def apart(step: Addition) -> tuple[Addition, ...]:
@@ -242,10 +269,9 @@ def addition(
     kind = ""
     if is_law(candidate.name):
         kind = f"empirical, not a physical effect, seen for {ranges_text(found.seen)}; "
-    trained, held = f"{told(share):.0%}", f"{told(unseen):.0%}"
-    falls = f"weighted misfit {trained} smaller in training, {held} in {evidence.value}"
+    said = f"{candidate.name}: {kind}{falls(share, unseen, evidence)}"
     return Addition(
-        rig=replace(found, notes=(*rig.notes, f"{candidate.name}: {kind}{falls}")),
+        rig=replace(found, notes=(*rig.notes, said)),
         candidate=candidate,
         before=before,
         after=errors_of(fit, unseen_fit),

@@ -39,6 +39,7 @@ from workbench.diagnosis.result import (
 from workbench.diagnosis.scan import Profile
 from workbench.diagnosis.settle import with_settled_sizes
 from workbench.diagnosis.verdict import (
+    NOT_CONVERGED,
     far_above_noise,
     held,
     judged,
@@ -102,7 +103,7 @@ def diagnose(
     where, begun = locate(problem, train), problem.base
     found = _asked_at_best(problem, where, progress)
     if not found.problem.base.converged:
-        warnings += ("the prior fit did not converge: the ranking is provisional",)
+        warnings += (f"the prior fit {NOT_CONVERGED}: the ranking is provisional",)
     if where and found.problem.base is not begun:
         where = replace(where, by_regime=regime_shares(found.problem.base))
     where = where or of_residual(found.problem.base)
@@ -198,7 +199,7 @@ def _concluded(
     best = ranking[0] if verdict in NAMING else None
     warnings = unexplained(far, verdict, ranking)
     if best and best.fit and not best.fit.converged:
-        told = f"the refit with {best.candidate.name} did not converge: its size may be off"
+        told = f"the refit with {best.candidate.name} {NOT_CONVERGED}: its size may be off"
         warnings = (told, *warnings)
     named = law or best
     last, unseen = (named.fit, named.validation) if named else (None, None)

@@ -20,11 +20,11 @@ from workbench.diagnosis.absent import unknown_forms
 from workbench.diagnosis.addition import Addition, accept, add, assembled
 from workbench.diagnosis.diagnose import Progress, diagnose, silent
 from workbench.diagnosis.improvement import Change, Improvement
+from workbench.diagnosis.last_notes import with_last_notes
 from workbench.diagnosis.law_addition import accept_law, add_law
-from workbench.diagnosis.passes import Kept, Passes
-from workbench.diagnosis.rounds import Rounds, forward, leaves_less
-from workbench.fitting.errors import Errors, errors_of, per_sample
-from workbench.fitting.gauss_newton import Fit
+from workbench.diagnosis.passes import Passes
+from workbench.diagnosis.rounds import Rounds, accepts, forward
+from workbench.fitting.errors import Errors, errors_of
 from workbench.fitting.posterior import Moved, fitted_rig, moved_parameters
 from workbench.fitting.problem import NO_EVIDENCE, proves_nothing
 from workbench.recording import Recording
@@ -78,14 +78,16 @@ def _thought_over(
     """Backward pass, then swap pass; an interrupt keeps what is finished."""
     passes = Passes(done.rig, train, validation, done.origins, progress, done.opened)
     try:
-        for step in done.steps:
+        for step in passes.in_turn(done.steps):
             done = _removed(done, passes, step)
-        for step in done.kept.steps if done.kept else ():
+        for step in passes.in_turn(done.kept.steps if done.kept else ()):
             done = _swapped(done, passes, step)
     except KeyboardInterrupt:
         progress("stopped in the second thoughts: what is finished stays")
         done = replace(done, stopped=True)
-    return done
+    if done.kept is None:
+        return done
+    return replace(done, kept=with_last_notes(done.kept, done.steps, done.removals, done.swaps))
 
 
 def _removed(done: Rounds, passes: Passes, step: Addition) -> Rounds:
@@ -121,18 +123,23 @@ def _with_law(
     validation: Sequence[Recording],
     progress: Progress,
 ) -> Rounds:
-    """An empirical law on top, where nothing of the catalogue earns its place and one passes."""
+    """An empirical law on top, where nothing of the catalogue earns its place and one passes.
+
+    The second thoughts asked only what was there.  Where they changed it, another effect may be
+    missing now: then no law is taken, and it is told.
+    """
     steps = done.kept.steps if done.kept else ()
     current, last = assembled(done.rig, steps), done.diagnoses[-1]
     try:
         if [step.candidate for step in steps] != [step.candidate for step in done.steps]:
             progress("diagnosis of what is kept")
             last = diagnose(current, train, validation, progress)
+            done = done.told(last).fitted_again(last)
+            done = replace(done, left_out=last.ranking[0].candidate.name if accepts(last) else "")
     except KeyboardInterrupt:
         progress("stopped before the empirical law")
         return replace(done, stopped=True)
-    best = last.ranking[0] if last.ranking else None
-    if last.law is None or (best is not None and best.accepted):
+    if last.law is None or accepts(last):
         return done
     for step in accept_law(current, last.law, last.before, last.evidence):
         progress(f"empirical: {step.candidate.name}")
@@ -152,7 +159,7 @@ def _improvement(
     if done.law:
         final, fit, held_out = done.steps[-1].rig, done.law.fit or fit, done.law.validation
     elif done.kept and done.kept.steps:
-        fit, held_out = _last_fit(done, done.kept)
+        fit, held_out = done.last_fit
         final = fitted_rig(assembled(done.rig, done.kept.steps), fit)
     if final is not done.rig:
         steps = (*done.steps, *(done.kept.steps if done.kept else ()))  # rivals that came in too
@@ -174,38 +181,32 @@ def _improvement(
         ahead=done.ahead,
         law=done.law,
         before=first.before,
-        after=errors_of(fit, held_out),
+        after=done.came if final is done.rig else errors_of(fit, held_out),
         free_before=free[0],
         free_after=free[1],
         parameters=parameters,
         budget=done.budget,
         stopped=done.stopped,
+        used_up=done.used_up,
+        left_out=done.left_out,
         fit=fit,
         validation_fit=held_out,
         came=done.came,
     )
 
 
-def _last_fit(done: Rounds, kept: Kept) -> tuple[Fit, Fit | None]:
-    """The fit of what is kept: that of the last diagnosis where it leaves less on both sets."""
-    last, found = done.diagnoses[-1], (kept.fit, kept.validation)
-    added = last.ranking and last.ranking[0].accepted  # after that fit
-    if added or [s.candidate for s in kept.steps] != [s.candidate for s in done.steps]:
-        return found
-    again = (last.base, last.base_validation)
-    return again if leaves_less(again, [per_sample(fit) for fit in found]) else found
-
-
 def _counted_from(rig: Rig, added: Collection[str], row: Moved) -> Moved:
     """A fitted parameter against the rig as it came, where it was absent or had a prior.
 
-    ``added`` are forms of what was absent, whatever held them in the fit.
+    ``added`` are forms of what was absent, whatever held them in the fit.  What is absent and has a
+    prior in the fit is tolerated: every fit may use a little of it.
     """
-    if row.name in added:
-        return replace(row, prior_deviation=inf)
     known = rig.plant.parameters.get(row.name)
     if known is None:  # an empirical term
         return replace(row, before=0.0, prior_deviation=inf)
     before = rig.plant.values[row.name]
-    prior = rig.standard_deviation(row.name) if before != known.null else 0.0
-    return replace(row, before=before, prior_deviation=prior or inf)
+    if row.name in added:
+        return replace(row, before=before, prior_deviation=inf)
+    if before == known.null:
+        return replace(row, before=before)
+    return replace(row, before=before, prior_deviation=rig.standard_deviation(row.name) or inf)

@@ -9,11 +9,14 @@ from typing import NamedTuple
 from workbench.diagnosis.addition import Addition
 from workbench.diagnosis.passes import Removal, Swap
 from workbench.diagnosis.result import Diagnosis, Law
-from workbench.diagnosis.verdict import UNEXPLAINED
+from workbench.diagnosis.verdict import UNEXPLAINED, of_one_model
 from workbench.fitting.errors import Errors
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.posterior import Moved
 from workbench.rig import Rig
+
+CLEARLY_USED = 0.5  # prior deviations of what is tolerated, chosen: beyond it a word is said
+SHOWN = 2.0  # deviations from nothing
 
 
 class Change(Enum):
@@ -59,7 +62,9 @@ class Improvement:
         What the rounds added, in order, the terms of a law at the end; also what was dropped later.
     diagnoses
         One for each round, and one more where an effect that a round had refused came in with the
-        next one; the last one accepted nothing, unless the user stopped it or no round was left.
+        next one, and where a law was asked for after the second thoughts had changed the model;
+        the last one accepted nothing, unless the user stopped it, no round was left, or that one
+        accepts an effect, which is ``left_out``.
     ahead
         What was tried for one round more, also in vain.
     removals, swaps
@@ -68,7 +73,7 @@ class Improvement:
         The empirical law that was taken, None without.
     came, before, after
         Errors over windows with free starts on both sets: as the rig came, with its parameters
-        refitted and nothing added, and in the end.
+        refitted and nothing added, and of the rig in the end: as it came where nothing is kept.
     free_before, free_after
         The same over free runs, as the rig came and in the end; empty for a plant without states,
         or where the user stopped them.  Where positions integrate they are no judge: the right
@@ -80,8 +85,13 @@ class Improvement:
         change; where the next diagnosis fits the same model again and lower, that fit's.
     stopped
         True where the user stopped it after at least one finished round.
+    used_up
+        True where the last round that there is added something: more may be missing.
+    left_out
+        The effect that the diagnosis before a law accepts, in place of which none was taken.
     fit, validation_fit
-        The final fits; those of the first prior fit where nothing was accepted.
+        The final fits; those of the first prior fit, which the rig does not take, where nothing is
+        kept.
     """
 
     rig: Rig
@@ -101,13 +111,33 @@ class Improvement:
     fit: Fit = field(repr=False)
     validation_fit: Fit | None = field(repr=False)
     came: Errors = field(default_factory=dict)
+    used_up: bool = False
+    left_out: str = ""
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the diagnoses warn of, each once; of errors that remain only the last one."""
+        """What the diagnoses warn of, each once; of their models only that of the last one."""
         *earlier, last = self.diagnoses
-        kept = [w for found in earlier for w in found.warnings if not w.startswith(UNEXPLAINED)]
+        kept = [w for found in earlier for w in found.warnings if not of_one_model(w)]
         return tuple(dict.fromkeys((*kept, *last.warnings)))
+
+    def warned_then(self, diagnosis: Diagnosis) -> tuple[str, ...]:
+        """What a diagnosis warned of its model alone, which holds no longer; without errors left.
+
+        That errors are left is what the next round was for.
+        """
+        gone = (w for w in diagnosis.warnings if w not in self.warnings)
+        return tuple(w for w in gone if not w.startswith(UNEXPLAINED))
+
+    @property
+    def tolerated(self) -> tuple[Moved, ...]:
+        """What the final fit clearly uses of what was absent and is no effect that was added.
+
+        Every fit may, and nothing is named for it; but it is in the rig.
+        """
+        null = {name: known.null for name, known in self.rig.plant.parameters.items()}
+        used = (row for row in self.parameters if row.before == null.get(row.name))
+        return tuple(row for row in used if row.far > CLEARLY_USED and _shown(row))
 
     @property
     def kept(self) -> tuple[str, ...]:
@@ -116,3 +146,8 @@ class Improvement:
         gone = [each.candidate.name for each in self.removals if each.dropped]
         swapped = {s.candidate.name: s.rival.name for s in self.swaps if s.replaced}
         return tuple(swapped.get(name, name) for name in names if name not in gone)
+
+
+def _shown(row: Moved) -> bool:
+    """True for what is surely more than nothing."""
+    return row.at_bound or abs(row.after - row.before) > SHOWN * row.deviation

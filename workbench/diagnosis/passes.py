@@ -12,11 +12,11 @@ Source: diagnosis.md 1.10.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import nan
 
 from workbench.candidate import Candidate
-from workbench.diagnosis.addition import Addition, addition, assembled
+from workbench.diagnosis.addition import Addition, assembled, refitted_addition
 from workbench.diagnosis.diagnose import Progress
 from workbench.diagnosis.evidence import weighed
 from workbench.diagnosis.judge import clearly_less, reasons_against
@@ -26,7 +26,6 @@ from workbench.diagnosis.rough import rough_fit
 from workbench.diagnosis.scan import scan
 from workbench.diagnosis.shifts import shifts
 from workbench.effect import Kind
-from workbench.fitting.errors import errors_of
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.problem import BELIEVED, Problem, improved_base, pose
 from workbench.recording import Recording
@@ -59,7 +58,7 @@ class Removal:
 class Swap:
     """One accepted effect against a rival in its place, each share of the misfit without both.
 
-    ``replaced`` is True where the rival took the place.
+    ``replaced`` is True where the rival took the place: then ``addition`` is that of the rival.
     """
 
     candidate: Candidate
@@ -69,6 +68,16 @@ class Swap:
     rival_train: float
     rival_validation: float
     replaced: bool
+    addition: Addition | None = field(default=None, repr=False)
+
+    @property
+    def clearly_worse(self) -> bool:
+        """True where the rival leaves clearly more than what it was tried for, held out too."""
+        pairs = (
+            (self.share_train, self.rival_train),
+            (self.share_validation, self.rival_validation),
+        )
+        return all(_leaves_less(own, rival) for own, rival in pairs)
 
 
 @dataclass(frozen=True)
@@ -123,6 +132,18 @@ class Passes:
     progress: Progress
     opened: Opened = field(default_factory=dict, repr=False)
 
+    def in_turn(self, steps: Sequence[Addition]) -> tuple[Addition, ...]:
+        """The order to ask in: as they came in, but each after those that mean nothing without it.
+
+        So what is needed by one that goes is asked itself, when that one is gone.
+        """
+        left, order = list(steps), []
+        while left:
+            rests = ([*left[:k], *left[k + 1 :]] for k in range(len(left)))
+            k = next((k for k, rest in enumerate(rests) if not self._needing(rest)), 0)
+            order.append(left.pop(k))
+        return tuple(order)
+
     def removal(self, kept: Kept, step: Addition) -> tuple[Removal, Kept]:
         """Take one effect out: whether it earns its place, and what is kept after that."""
         candidate, rest = step.candidate, kept.without(step)
@@ -162,7 +183,9 @@ class Passes:
             rival = (found.drop_train, found.drop_validation)
             tried.append(Swap(step.candidate, row.candidate, *own, *rival, better))
             if better:
-                return tried, self._with(kept.without(step), at.problem, found)
+                kept = self._with(kept.without(step), at.problem, found)
+                tried[-1] = replace(tried[-1], addition=kept.steps[-1])
+                return tried, kept
         return tried, kept
 
     def _needing(self, rest: Sequence[Addition]) -> str:
@@ -202,24 +225,22 @@ class Passes:
         return tied[:MOST_RIVALS] or others[:1]
 
     def _with(self, rest: tuple[Addition, ...], problem: Problem, found: Refit) -> Kept:
-        """What is kept with a rival in the place of an effect."""
-        before = errors_of(problem.base, problem.base_validation)
-        drops = (found.drop_train, found.drop_validation)
+        """What is kept with a rival in the place of an effect, its size settled."""
         evidence = weighed(Evidence.VALIDATION, problem.base_validation)
-        bare, fits = assembled(self.rig, rest), (found.fit, found.validation)
-        added = addition(bare, before, found.candidate, *fits, drops, evidence)
-        return Kept((*rest, added), found.fit, found.validation)
+        added = refitted_addition(assembled(self.rig, rest), problem, found, evidence)
+        return Kept((*rest, added), added.fit, added.validation_fit)
 
 
 def clearly_better(base: Fit, one: Refit, other: Refit) -> bool:
     """True where one passes every criterion and leaves a fifth less misfit, held out too."""
-
-    def less(a: float, b: float) -> bool:
-        return clearly_less(max(1.0 - a, LEAST_LEFT), max(1.0 - b, LEAST_LEFT))
-
-    ahead = less(one.drop_train, other.drop_train)
-    ahead = ahead and less(one.drop_validation, other.drop_validation)
+    ahead = _leaves_less(one.drop_train, other.drop_train)
+    ahead = ahead and _leaves_less(one.drop_validation, other.drop_validation)
     return ahead and not reasons_against(base, one)
+
+
+def _leaves_less(share: float, other: float) -> bool:
+    """True where removing one share of a misfit leaves a fifth less than removing another."""
+    return clearly_less(max(1.0 - share, LEAST_LEFT), max(1.0 - other, LEAST_LEFT))
 
 
 def _put_back(problem: Problem, candidate: Candidate, final: Fit) -> Refit:

@@ -57,6 +57,9 @@ class Rounds:
 
     ``origins`` is the diagnosis by which each effect came in, by its public name; ``opened`` are
     models without one effect that are fitted already; ``came`` are errors of the rig as it came.
+    ``left_out`` is an effect that the diagnosis before a law accepts and nothing adds; ``used_up``
+    is True where the last round that there is added something.
+    ``again`` are the fits of the last diagnosis where it fits the model of the last bar and lower.
     """
 
     rig: Rig
@@ -71,12 +74,20 @@ class Rounds:
     opened: Opened = field(default_factory=dict, repr=False)
     law: Law | None = None
     stopped: bool = False
+    used_up: bool = False
+    left_out: str = ""
     came: Errors = field(default_factory=dict)
+    again: tuple[Fit, Fit | None] | None = field(default=None, repr=False)
+
+    @property
+    def last_fit(self) -> tuple[Fit, Fit | None]:
+        """The fits of what is kept, as low as the last bar."""
+        return self.again or (self.kept.fit, self.kept.validation)
 
     def marked(self, label: str, fit: Fit, held_out: Fit | None, change: Change) -> Rounds:
         """The same with one more bar in the budget."""
         stage = Stage(label, per_sample(fit), per_sample(held_out), change)
-        return replace(self, budget=(*self.budget, stage))
+        return replace(self, budget=(*self.budget, stage), again=None)
 
     def told(self, diagnosis: Diagnosis) -> Rounds:
         """The same with one more diagnosis.
@@ -95,15 +106,19 @@ class Rounds:
     def fitted_again(self, diagnosis: Diagnosis) -> Rounds:
         """The same, the last bar as low as the next diagnosis begins.
 
-        So no step is credited with what another fit of the model before it would give.
+        So no step is credited with what another fit of the model before it would give.  A diagnosis
+        chooses its windows anew: errors over longer ones are no measure of those over shorter ones.
         """
+        length = diagnosis.base.windows.length
+        if self.kept is not None and self.kept.fit.windows.length != length:
+            return self
         *earlier, last = self.budget
         fits = (diagnosis.base, diagnosis.base_validation)
         if not leaves_less(fits, (last.train, last.validation)):
             return self
         train, validation = map(per_sample, fits)
         lower = last._replace(train=train, validation=validation)
-        return replace(self, budget=(*earlier, lower))
+        return replace(self, budget=(*earlier, lower), again=fits)
 
     def looked(self, candidate: Candidate, outcome: str) -> Rounds:
         """The same with what came of trying an effect for one round more."""
@@ -159,7 +174,8 @@ def forward(
         if len(later.steps) == len(done.steps):
             return later
         done = later
-    return done
+    progress(f"all {MOST_ROUNDS} rounds added something")
+    return replace(done, used_up=True)
 
 
 def _round(done: Rounds, asked: _Asked) -> Rounds:
@@ -170,7 +186,7 @@ def _round(done: Rounds, asked: _Asked) -> Rounds:
     if diagnosis.contradicted:
         asked.progress(f"stopped: {diagnosis.sentence}")
         return done
-    if _accepts(diagnosis):
+    if accepts(diagnosis):
         asked.progress(f"accepted {diagnosis.ranking[0].candidate.name}")
         step = accept(current, diagnosis)
         return done.added(step, *(diagnosis for _ in step.candidate.singles))
@@ -195,10 +211,12 @@ def leaves_less(fits: Sequence[Fit | None], errors: Sequence[float]) -> bool:
     return all(per_sample(fit) < LESS * error for fit, error in pairs)
 
 
-def _accepts(diagnosis: Diagnosis) -> bool:
-    """True where the ranking puts something first that passes every criterion."""
+def accepts(diagnosis: Diagnosis) -> bool:
+    """True where the ranking puts something first that passes every criterion and may be added."""
     best = diagnosis.ranking[0] if diagnosis.ranking else None
-    return best is not None and best.fit is not None and best.accepted
+    if best is None or diagnosis.contradicted:
+        return False
+    return best.fit is not None and best.accepted
 
 
 def _promising(diagnosis: Diagnosis) -> Ranked | None:
@@ -221,7 +239,7 @@ def _further(done: Rounds, current: Rig, row: Ranked, asked: _Asked) -> Rounds:
     asked.progress(f"one round further with {refused.name}")
     steps = (*done.steps, addition_of(current, first, row))
     second = asked.diagnosis(assembled(done.rig, steps))
-    if second.contradicted or not _accepts(second) or not _is_effect(second.ranking[0]):
+    if not accepts(second) or not _is_effect(second.ranking[0]):
         return done.looked(refused, "no effect passes every criterion on top of it")
     leader = second.ranking[0]
     problem = posed(current, first.base, first.base_validation)

@@ -18,6 +18,11 @@ from workbench.units import public_name
 FAR_ABOVE_NOISE = 3.0  # RMSE over noise that is worth a word where nothing is named
 WORSE = 1.5  # RMSE of an output with what is named over that without it, and over its noise
 UNEXPLAINED = "unexplained errors remain on held-out windows"
+LARGER = "what is named makes errors larger"
+BEYOND = f"would go further than {BELIEVED:g} deviations from what the rig believes"
+WITH_PRIORS = f"with priors {WIDER:g} times as wide"
+NOT_CONVERGED = "did not converge"
+OF_ONE_MODEL = (UNEXPLAINED, LARGER, BEYOND, WITH_PRIORS, NOT_CONVERGED)
 FEWEST_WINDOWS = 2  # fitted, of a plant that moves: some effect makes up for any one stroke
 BLIND_SHOWN = 4  # names of what a recording cannot show
 HELD_SHOWN = 3  # names of what is held
@@ -91,7 +96,7 @@ def unsteady(
     known = (leader.candidate.name, *leader.alike)
     if first == profiles[0].candidate or first.name in known:
         return ()
-    return (f"with priors {WIDER:g} times as wide {first.name} would lead the scan",)
+    return (f"{WITH_PRIORS} {first.name} would lead the scan",)
 
 
 def unexplained(far: Sequence[str], verdict: Verdict, ranking: Sequence[Ranked]) -> tuple[str, ...]:
@@ -119,7 +124,7 @@ def worsened(before: Errors, after: Errors) -> tuple[str, ...]:
         for name, error in before.get(where, {}).items()
         if after[where][name].rmse > WORSE * max(error.rmse, error.noise)
     ]
-    return (f"what is named makes errors larger: {', '.join(told)}",) if told else ()
+    return (f"{LARGER}: {', '.join(told)}",) if told else ()
 
 
 def held(last: Fit) -> tuple[str, ...]:
@@ -131,8 +136,15 @@ def held(last: Fit) -> tuple[str, ...]:
     if not names:
         return ()
     more = f" and {len(names) - HELD_SHOWN} more" if len(names) > HELD_SHOWN else ""
-    beyond = f"would go further than {BELIEVED:g} deviations from what the rig believes"
-    return (f"{', '.join(names[:HELD_SHOWN])}{more} {beyond}: `workbench fit` lets them",)
+    return (f"{', '.join(names[:HELD_SHOWN])}{more} {BEYOND}: `workbench fit` lets them",)
+
+
+def of_one_model(warning: str) -> bool:
+    """True for what is said of the model of one round, not of the recordings.
+
+    With another effect added it is to be asked again.
+    """
+    return any(words in warning for words in OF_ONE_MODEL)
 
 
 def sentence(
