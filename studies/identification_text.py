@@ -13,12 +13,14 @@ from studies.text import columns, shown
 from workbench.errors import InputError, Message, listed, nearest
 from workbench.identification import PROCEDURES
 from workbench.identification.dead_volume import PROCEDURE as DEAD_VOLUME
-from workbench.identification.result import Estimate, Identified, Procedure
+from workbench.identification.estimate import Estimate
+from workbench.identification.result import Identified, Procedure
 from workbench.identification.standing import standing
 from workbench.identification.tank_curves import FlowFit, TankCurve
 from workbench.units import UnitError, public_name, quantity, si_unit
 
 WIDTH = 100  # of a guide, in characters
+UNFOLLOWED = 3.0  # RMS over noise: the plant lacks something that is in the recording
 
 
 def procedures_text() -> str:
@@ -101,7 +103,10 @@ def identified_text(procedure: Procedure, found: Identified) -> str:
 
 
 def doubts(procedure: Procedure, found: Identified) -> list[str]:
-    """A sentence for each parameter far from the rig's value or at the end of its range."""
+    """A sentence for each parameter far from the rig's value or at the end of its range.
+
+    Those of the procedure itself come last.
+    """
     said, own = [], found.rig.plant.values
     also = ", and --tank the volume of its tank" if procedure.name == DEAD_VOLUME.name else ""
     for each in found.parameters:
@@ -109,7 +114,11 @@ def doubts(procedure: Procedure, found: Identified) -> list[str]:
         stands = standing(found.rig, each)
         if stands.at_bound:
             end = shown(stands.end, each.name)
-            said.append(f"{name} {value} is no result: its range ends at {end}")
+            why = "shows nothing of it" if stands.none else "is no result"
+            said.append(f"{name} {value} {why}: its range ends at {end}")
+        elif stands.silent:
+            spread = shown(each.deviation, each.name, 2)
+            said.append(f"{name} {value} +- {spread} is no result: the recordings say little of it")
         if stands.far:
             said.append(
                 f"{name} {value} lies {stands.deviations_off:.3g} prior deviations from the "
@@ -119,7 +128,20 @@ def doubts(procedure: Procedure, found: Identified) -> list[str]:
     if ended:
         many = f"{len(ended)} of {len(found.curves)} curves"
         said.append(f"{many} have values at the end of their range, which are no results")
-    return said
+    return [*said, *_unfollowed(found), *found.doubts]
+
+
+def _unfollowed(found: Identified) -> list[str]:
+    """What to say of curves that lie further from the plant than noise does."""
+    far = [curve for curve in found.curves if curve.misfit > UNFOLLOWED]
+    if not far:
+        return []
+    worst = max(far, key=lambda curve: curve.misfit)
+    return [
+        f"{len(far)} of {len(found.curves)} curves lie off the fit by more than noise, "
+        f"{worst.label} by {worst.misfit:.2g} times: the plant does not follow this recording: "
+        "a leak, the offset of a sensor, or another supply?"
+    ]
 
 
 def identification_document(procedure: Procedure, found: Identified) -> Document:

@@ -18,7 +18,7 @@ from workbench.comparison import compare
 from workbench.errors import InputError
 from workbench.identification import PROCEDURES, least_squares
 from workbench.identification.dead_zone import dead_zone
-from workbench.identification.standing import end_reached
+from workbench.identification.estimate import end_reached
 from workbench.identification.tank_curves import LEAN, tank_curves
 from workbench.rig import default_rig, load_rig
 from workbench.rig_writing import rig_text
@@ -216,12 +216,14 @@ def test_what_a_rig_fixes_stays(limits):
     assert better.plant.values[ZONE[1]] == limits[ZONE[1]].value
 
 
-def test_a_value_beyond_its_range_is_taken_at_its_end_and_the_rig_says_so(limits):
+def test_a_value_beyond_its_range_is_not_taken_and_the_rig_says_so(limits):
+    """It overwrote what the rig knew with the end of the range, which is no result."""
     first, *others = limits.parameters
     end = TANK.plant.parameters[first.name].upper
     better = replace(limits, parameters=(replace(first, value=end + 1.0), *others)).improved()
 
-    assert better.plant.values[first.name] == end
+    assert better.plant.values[first.name] == TANK.plant.values[first.name]
+    assert first.name not in better.deviations
     assert any("at the end of its range" in note for note in better.notes)
     assert not any("at the end of its range" in note for note in limits.improved().notes)
 

@@ -14,8 +14,8 @@ from studies.truth import dedicated as truth
 from workbench.effect import Parameter
 from workbench.errors import likest_first
 from workbench.identification import PROCEDURES
-from workbench.identification.result import Curve, Estimate, Identified
-from workbench.identification.standing import end_reached
+from workbench.identification.estimate import Estimate, end_reached
+from workbench.identification.result import Curve, Identified
 from workbench.identification.tank_curves import FlowFit, TankCurve
 from workbench.rig import default_rig
 
@@ -25,7 +25,8 @@ LINE = np.zeros(2)
 
 def identified(name, value, plant="servo_drive"):
     rig = default_rig(plant)
-    return Identified(rig=rig, estimates=(), parameters=(Estimate(name, value, 0.15),), curves=())
+    found = Estimate(name, value, 0.01 * abs(value))
+    return Identified(rig=rig, estimates=(), parameters=(found,), curves=())
 
 
 def test_a_range_ends_a_thousandth_of_its_width_early_and_open_ranges_by_their_typical_size():

@@ -78,7 +78,7 @@ def identify(
         read = read_all(known, recordings, say)
         say(f"identifying {chosen.gives}")
         found = chosen.run(known, read)
-        better = found.improved(other, chosen.note(found, read)) if output else known
+        better = found.improved(other, chosen.note(found, read, other)) if output else known
         write_json(json, identification_document(chosen, found))
         if figures:
             from studies.figures.identification import identification_figures

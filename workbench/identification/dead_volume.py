@@ -8,10 +8,9 @@ temperature of the room, so that the gas of both is that of the common volume:
 all pressures absolute.  Erratum E002-9: Eq. 22 prints V_i = V_1 (P_1 / P_2 - 1), which holds for an
 empty chamber only; with absolute pressures and a chamber at ambient it is 20 % too small.
 
-P_2 is read in the flat window, at least 20 s behind the release, and carried back to the
-release along its own slope there: what is lost by then has leaked, not cooled.  The dead volume is
-V_i without what the piston has swept, by the plant's own geometry; where the plant changes its dead
-volume by a share, it keeps that share and what is found is the volume that is changed.
+Where P_2 is read, and against what, says `release.py`.  The dead volume is V_i without what the
+piston has swept, by the plant's own geometry; where the plant changes its dead volume by a share,
+it keeps that share and what is found is the volume that is changed.
 
 Source: paper 002 Eqs. 22, 23, Fig. 15, Table 6 (E002-8, E002-9); physics.md 5, row S002-7.
 """
@@ -24,6 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from workbench.errors import InputError, Message, likest_first, listed
+from workbench.identification.estimate import Estimate
 from workbench.identification.held_gas import (
     STILL_M,
     geometry,
@@ -31,7 +31,8 @@ from workbench.identification.held_gas import (
     position_channel,
     pressed_chamber,
 )
-from workbench.identification.result import Curve, Estimate, Identified, Procedure, complete, unfit
+from workbench.identification.release import TANK_CHANNEL, Release, release
+from workbench.identification.result import Curve, Identified, Procedure, complete, unfit
 from workbench.parts import Chamber
 from workbench.plant import Plant
 from workbench.recording import Recording
@@ -39,26 +40,7 @@ from workbench.rig import Rig
 from workbench.units import public_name
 
 TANK_M3 = 0.344e-3  # E002-10
-TANK_CHANNEL = "supply.pressure_pa"
-FLAT_S = (20.0, 30.0)  # behind the release
-LEAST_RISE = 0.05  # of the pressure of the tank
-SAME = 0.01  # of the pressure: the tank has emptied into the chamber
-GAUGE_ERROR = 1e-3  # of a pressure sensor's span of 10 bar: its share in the deviation
-SPAN_PA = 10e5
 NEAREST = 3  # columns that may hold the tank's pressure
-
-
-@dataclass(frozen=True)
-class Release:
-    """One release: pressures in Pa, times in s behind the start of the recording."""
-
-    chamber: str
-    opened_s: float
-    window_s: tuple[float, float]
-    tank_pa: float
-    before_pa: float
-    after_pa: float
-    slope_pa_s: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,13 +68,13 @@ def dead_volume(
     releases, curves = [], []
     for each in recordings:
         chamber = _locked(plant, each)
-        release = _release(chamber, each)
+        opened = release(chamber, each)
         if chamber.name in found:
             what = f"fills {chamber.name} again"
             raise unfit(each, what, "one recording for each chamber")
-        found[chamber.name] = _volumes(plant, chamber, each, release, tank_volume_m3)
-        releases.append(release)
-        curves.append(_curve(each, release))
+        found[chamber.name] = _volumes(plant, chamber, each, opened, tank_volume_m3)
+        releases.append(opened)
+        curves.append(_curve(each, opened))
     return DeadVolumes(
         rig=rig,
         estimates=tuple(total for total, _ in found.values()),
@@ -132,44 +114,12 @@ def _no_tank(recording: Recording) -> InputError:
     return unfit(recording, what, expected)
 
 
-def _release(chamber: Chamber, recording: Recording) -> Release:
-    pressure, tank = recording[f"{chamber.name}.pressure_pa"], recording[TANK_CHANNEL]
-    time_s = recording.time_s
-    expected = "a full tank let into the chamber once, 0.2 s or more after the start"
-    first = max(round(0.1 / recording.sample_time_s), 3)
-    rise_pa = float(np.max(pressure) - np.mean(pressure[:first]))
-    if rise_pa < LEAST_RISE * float(np.mean(tank[:first])):
-        what = f"is no reservoir test: {chamber.name} rises by {rise_pa / 1e5:.2g} bar only"
-        raise unfit(recording, what, expected)
-    begun = int(np.flatnonzero(pressure > np.mean(pressure[:first]) + 0.05 * rise_pa)[0])
-    if begun < 2 * first:
-        what = f"is no reservoir test: it begins {time_s[begun]:.2g} s before the release"
-        raise unfit(recording, what, expected)
-    opened_s = float(time_s[begun])
-    window_s = (opened_s + FLAT_S[0], opened_s + FLAT_S[1])
-    if time_s[-1] < window_s[1]:
-        what = f"ends {time_s[-1] - opened_s:.3g} s after the release"
-        raise unfit(recording, what, f"{FLAT_S[1]:g} s: the gas must come to room temperature")
-    flat = (time_s >= window_s[0]) & (time_s <= window_s[1])
-    slope, level = np.polyfit(time_s[flat] - opened_s, pressure[flat], 1)
-    apart_pa = abs(float(np.mean(tank[flat] - pressure[flat])))
-    if apart_pa > SAME * float(np.mean(pressure[flat])):
-        what = f"is no reservoir test: tank and chamber end {apart_pa / 1e5:.2g} bar apart"
-        raise unfit(recording, what, "the tap left open until both have one pressure")
-    before = slice(0, begun - first)
-    means = (float(np.mean(channel[before])) for channel in (tank, pressure))
-    return Release(chamber.name, opened_s, window_s, *means, float(level), float(slope))
-
-
 def _volumes(
-    plant: Plant, chamber: Chamber, recording: Recording, release: Release, tank_m3: float
+    plant: Plant, chamber: Chamber, recording: Recording, opened: Release, tank_m3: float
 ) -> tuple[Estimate, Estimate]:
-    """Total volume and dead volume; the deviation is that of three pressure readings."""
-    fallen = release.tank_pa - release.after_pa
-    risen = release.after_pa - release.before_pa
-    total = tank_m3 * fallen / risen
-    slopes = np.array([1 / fallen, -1 / fallen - 1 / risen, 1 / risen])
-    deviation = total * GAUGE_ERROR * SPAN_PA * float(np.linalg.norm(slopes)) / np.sqrt(12.0)
+    """Total volume and dead volume."""
+    total = tank_m3 * opened.fallen_pa / opened.risen_pa
+    deviation = total * opened.deviation
     dead = f"{chamber.name}.dead_volume_m3"
     changed = 1.0 + plant.values.get(f"{chamber.name}.dead_volume_change", 0.0)
     volume, _ = geometry(plant, chamber, held_position_m(chamber, recording))
@@ -180,13 +130,14 @@ def _volumes(
     )
 
 
-def _curve(recording: Recording, release: Release) -> Curve:
-    """Pressure of the chamber, and the line through its flat window from the release on."""
-    time_s, pressure = recording.time_s, recording[f"{release.chamber}.pressure_pa"]
-    line = release.after_pa + release.slope_pa_s * (time_s - release.opened_s)
-    fitted = np.where(time_s < release.opened_s, release.before_pa, line)
+def _curve(recording: Recording, opened: Release) -> Curve:
+    """Pressure of the chamber, and the exponential through its flat window from the release on."""
+    time_s, pressure = recording.time_s, recording[f"{opened.chamber}.pressure_pa"]
+    behind_s = np.maximum(time_s - opened.opened_s, 0.0)
+    leaking = opened.after_pa * np.exp(-opened.leak_per_s * behind_s)
+    fitted = np.where(time_s < opened.opened_s, opened.before_pa, leaking)
     return Curve(
-        label=f"{recording.name}, {release.chamber}",
+        label=f"{recording.name}, {opened.chamber}",
         along=time_s,
         measured=pressure,
         fitted=fitted,
@@ -197,8 +148,8 @@ PROCEDURE = Procedure(
     name="dead-volume",
     gives="total and dead volume of each chamber",
     manoeuvre="piston locked at the far end of the chamber's stroke, a full tank of known volume "
-    "(--tank) in place of the supply: let it into the chamber 1 s after the start and leave it "
-    "open for 30 s; one recording for each chamber",
+    "(--tank), filled 20 s or more before, in place of the supply: let it into the chamber 1 s "
+    "after the start and leave it open for 30 s; one recording for each chamber",
     channels="valve.command, slide.position, the pressure of the chamber, and that of the tank as "
     "supply.pressure, at 50 Hz or more",
     example="dead-volume drive2.toml release_*.csv --tank '0.344 l' -o drive3.toml",

@@ -21,8 +21,9 @@ import numpy as np
 
 from workbench.fitting.noise import measured_noise
 from workbench.fitting.starts import guessed_states
+from workbench.identification.estimate import estimated
 from workbench.identification.least_squares import Solution, Unknown, solve
-from workbench.identification.result import Curve, Identified, Procedure, complete, estimated, unfit
+from workbench.identification.result import Curve, Identified, Procedure, complete, unfit
 from workbench.identification.runs import outputs_under
 from workbench.identification.tank import TankOnValve, rests_at, steady_supply, tank_on_valve
 from workbench.plant import Plant
@@ -68,7 +69,7 @@ def dead_zone(rig: Rig, recordings: Sequence[Recording]) -> DeadZoneLimits:
         rig=rig,
         estimates=estimated(("lower_limit_v", "upper_limit_v"), (lower_v, upper_v), deviations),
         parameters=estimated(names[:3], found.values[:3], found.deviations[:3]),
-        curves=tuple(_curves(plant, pieces, found.residuals)),
+        curves=tuple(_curves(plant, pieces, found.residuals, noise)),
         lower_v=lower_v,
         upper_v=upper_v,
     )
@@ -92,7 +93,9 @@ def _fitted(plant: Plant, pieces: list[Recording], names: list[str], noise: floa
     return solve(residuals, unknowns, noise)
 
 
-def _curves(plant: Plant, pieces: list[Recording], residuals: np.ndarray) -> list[Curve]:
+def _curves(
+    plant: Plant, pieces: list[Recording], residuals: np.ndarray, noise: float
+) -> list[Curve]:
     command, pressure = plant.commands[0].name, plant.measured[0]
     parts = np.split(residuals, np.cumsum([len(piece) for piece in pieces])[:-1])
     return [
@@ -101,6 +104,7 @@ def _curves(plant: Plant, pieces: list[Recording], residuals: np.ndarray) -> lis
             along=piece[command],
             measured=piece[pressure],
             fitted=piece[pressure] - left,
+            noise=noise,
         )
         for piece, left in zip(pieces, parts, strict=True)
     ]

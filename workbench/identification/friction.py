@@ -3,14 +3,13 @@
     F(v) = sign(v) g(v) + sigma_2 v,    g(v) = F_c + (F_s - F_c) exp(-(v / v_s)^2)
 
 by direction.  Runs at constant command give F_c and sigma_2, break-aways F_s; v_s is fitted only
-where a run is slow enough to show it (three v_s), and else stays the rig's.  F_s depends on
-where the piston rests, and its deviation counts the spread over the break-aways.
+where a run is slow enough to show it (three v_s) beside two others of its direction, and else stays
+the rig's.  Where a slow run has one other beside it, what is not known of v_s counts in both.  F_s
+depends on where the piston rests, and its deviation counts the spread over the break-aways.
 
 Where the rig has friction by pressure, it keeps its factor, and the map is without that part.
 
-The bristle follows by rule (S002-6): F_c / 50 um <= sigma_0 <= F_c / 1 um, and
-sigma_1 <= sigma_2 / (F_s / F_c - 1).  The rig keeps its own deflection inside these
-bounds; beyond them it gets sigma_0 = F_c / 25.3 um, the paper's choice, and the largest sigma_1.
+The bristle follows by rule, in `bristle.py` (S002-6).
 
 Source: paper 002 Eqs. 12 to 14, 20, 21, Figs. 13, 14, Table 5 (magnitudes for v < 0, E002-6;
 sigma_1 in N s/m, E002-13); physics.md 5.
@@ -18,7 +17,7 @@ sigma_1 in N s/m, E002-13); physics.md 5.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from math import inf
 
@@ -26,35 +25,33 @@ import casadi as ca
 import numpy as np
 
 from workbench.effect import Conditions
-from workbench.effects import BristleFriction, StribeckFriction
+from workbench.effects import StribeckFriction
 from workbench.errors import InputError, Message
+from workbench.identification.bristle import bristle, rule
+from workbench.identification.estimate import Estimate, estimated
 from workbench.identification.least_squares import Solution, Unknown, solve
-from workbench.identification.result import (
-    Curve,
-    Estimate,
-    Identified,
-    Procedure,
-    complete,
-    estimated,
-    unfit,
-)
+from workbench.identification.result import Curve, Identified, Procedure, complete, unfit
+from workbench.identification.settled import settled
 from workbench.identification.sliding import (
     BreakAway,
     SteadyRun,
     break_aways,
+    breaking_forces,
     motion,
+    speeds,
     steady_run,
 )
 from workbench.plant import Plant
 from workbench.recording import Recording
 from workbench.rig import Rig
 
-LEAST_RUNS = 2  # in each direction: Coulomb and viscous part
+LEAST_SPEEDS = 2  # in each direction: Coulomb and viscous part
+SPEEDS_OF_FALL = 3  # in one direction: these, and the fall of the curve
 SLOW = 3.0  # Stribeck velocities: a run below shows the fall of the curve
 LEAST_DEVIATION_N = 0.3  # of a force: two pressures and how they are averaged
 ONSET_M_S, FAR_M_S = 1e-6, 10.0  # where friction is static, and where no Stribeck peak is left
 WEIGHT_LEAN = 1.0  # how far the weights of the asymmetry lie from the rig's
-DEFLECTION_M = (1e-6, 50e-6, 25.3e-6)  # F_c over stiffness: least, largest, the paper's
+FALL_UNKNOWN = 0.5  # share of the Stribeck velocity that is not known where two speeds are all
 FREE = ("coulomb_force_n", "viscous_n_s_m", "asymmetry", "coulomb_weight")
 STATIC = ("stiction_excess_n", "excess_weight")
 FALL = "stribeck_velocity_m_s"
@@ -107,17 +104,22 @@ def friction(rig: Rig, recordings: Sequence[Recording]) -> FrictionMap:
         else:
             breaks += starts
     _check_directions(recordings, runs, breaks)
-    law = _law(effect, runs, breaks)
-    found = _fitted(law, runs, breaks)
+    free = [f"{effect.name}.{name}" for name in _free(effect, runs, breaks)]
+    told, found, doubts = settled(
+        rig, free, lambda names: _fitted(_law(effect, _fields(names)), runs, breaks)
+    )
+    law = _law(effect, _fields(told))
+    found = _unsure(found, law, runs, breaks)
     estimates = _told(law, found)
     return FrictionMap(
         rig=rig,
-        estimates=(*estimates, *_rule(estimates)),
-        parameters=(*_parameters(law, found), *_bristle(effect, estimates)),
+        estimates=(*estimates, *rule(estimates)),
+        parameters=(*_parameters(law, found), *bristle(effect, estimates)),
         curves=(_curve(law, found, runs),),
         runs=tuple(runs),
         break_aways=tuple(breaks),
         shape=_shape(law, found, runs),
+        doubts=doubts,
     )
 
 
@@ -135,9 +137,9 @@ def _check_directions(
 ) -> None:
     source = ", ".join(dict.fromkeys(each.source or each.name for each in recordings))
     forward = sum(run.velocity_m_s > 0 for run in runs)
-    if min(forward, len(runs) - forward) < LEAST_RUNS:
+    if min(speeds(runs, way) for way in (True, False)) < LEAST_SPEEDS:
         what = f"{forward} runs forward and {len(runs) - forward} back are no friction map"
-        expected = f"{LEAST_RUNS} runs or more at constant speed in each direction"
+        expected = f"runs at {LEAST_SPEEDS} constant speeds or more in each direction"
         raise InputError(Message(what, expected=expected, file=source))
     if breaks and len({each.forward for each in breaks}) < 2:
         way = "forward" if breaks[0].forward else "back"
@@ -145,13 +147,25 @@ def _check_directions(
         raise InputError(Message(what, expected="some in each direction, or none", file=source))
 
 
-def _law(effect: StribeckFriction, runs: list[SteadyRun], breaks: list[BreakAway]) -> _Law:
+def _free(
+    effect: StribeckFriction, runs: list[SteadyRun], breaks: list[BreakAway]
+) -> tuple[str, ...]:
+    """The law's own parameters that such recordings may tell."""
+    many = max(speeds(runs, way) for way in (True, False)) >= SPEEDS_OF_FALL
+    falls = breaks and many and _is_slow(effect, runs)
+    return (*FREE, *(STATIC if breaks else ()), *((FALL,) if falls else ()))
+
+
+def _fields(names: Iterable[str]) -> tuple[str, ...]:
+    """Names without that of their member."""
+    return tuple(name.rpartition(".")[2] for name in names)
+
+
+def _law(effect: StribeckFriction, free: tuple[str, ...]) -> _Law:
     """The law with symbols for what is free; forces that vary along the stroke average out.
 
     What pressure adds is not in the runs' friction, and so not in the law either.
     """
-    slow = min(abs(run.velocity_m_s) for run in runs) < SLOW * effect.stribeck_velocity_m_s
-    free = (*FREE, *(STATIC if breaks else ()), *((FALL,) if breaks and slow else ()))
     theta = {name: ca.SX.sym(name) for name in free}
     symbolic = replace(effect, position_share=0.0, pressure_factor_n_pa=0.0, **theta)
     v, unknown = ca.SX.sym("v"), ca.vertcat(*theta.values())
@@ -182,12 +196,9 @@ def _law(effect: StribeckFriction, runs: list[SteadyRun], breaks: list[BreakAway
 
 def _fitted(law: _Law, runs: list[SteadyRun], breaks: list[BreakAway]) -> Solution:
     points = [(r.velocity_m_s, r.force_n, r.deviation_n) for r in runs]
-    for forward in (True, False):
-        sizes = np.array([each.force_n for each in breaks if each.forward == forward])
-        if len(sizes):
-            side = 1.0 if forward else -1.0
-            spread = float(np.std(sizes)) / np.sqrt(len(sizes))
-            points.append((side * ONSET_M_S, side * float(sizes.mean()), spread))
+    for forward, size, spread in breaking_forces(breaks):
+        side = 1.0 if forward else -1.0
+        points.append((side * ONSET_M_S, side * size, spread))
     speed, force, deviation = np.array(points).T
     weight = 1.0 / np.maximum(deviation, LEAST_DEVIATION_N)
     effect, known = law.effect, law.effect.parameters()
@@ -206,6 +217,23 @@ def _fitted(law: _Law, runs: list[SteadyRun], breaks: list[BreakAway]) -> Soluti
     return solve(residuals, unknowns, noise=1.0)
 
 
+def _unsure(found: Solution, law: _Law, runs: list[SteadyRun], breaks: list[BreakAway]) -> Solution:
+    """The solution with what it moves by at another Stribeck velocity in its covariance.
+
+    A second fit tells, since the fall is too far from linear for a slope.
+    """
+    if FALL in law.free or not (breaks and _is_slow(law.effect, runs)):
+        return found
+    own = law.effect.stribeck_velocity_m_s
+    slower = replace(law.effect, stribeck_velocity_m_s=(1.0 + FALL_UNKNOWN) * own)
+    moved = _fitted(_law(slower, law.free), runs, breaks).values - found.values
+    return replace(found, covariance=found.covariance + np.outer(moved, moved))
+
+
+def _is_slow(effect: StribeckFriction, runs: list[SteadyRun]) -> bool:
+    return min(abs(run.velocity_m_s) for run in runs) < SLOW * effect.stribeck_velocity_m_s
+
+
 def _told(law: _Law, found: Solution) -> tuple[Estimate, ...]:
     """Table 5 of the paper: static, Coulomb and viscous friction by direction."""
     values, slopes = (each.full() for each in law.told(found.values))
@@ -221,46 +249,6 @@ def _told(law: _Law, found: Solution) -> tuple[Estimate, ...]:
 def _parameters(law: _Law, found: Solution) -> tuple[Estimate, ...]:
     names = (f"{law.effect.name}.{name}" for name in law.free)
     return estimated(names, found.values, found.deviations)
-
-
-def _bounds(estimates: Sequence[Estimate]) -> tuple[float, float, float]:
-    """Mean Coulomb friction, mean static friction, and the largest damping of the bristle."""
-    value = {each.name: each.value for each in estimates}
-    ways = ("forward", "backward")
-    coulomb, static = (
-        float(np.mean([value[f"{kind}_{way}_n"] for way in ways])) for kind in ("coulomb", "static")
-    )
-    damping = min(
-        value[f"viscous_{w}_n_s_m"]
-        / max(value[f"static_{w}_n"] / value[f"coulomb_{w}_n"] - 1.0, 1e-6)
-        for w in ways
-    )
-    return coulomb, static, damping
-
-
-def _rule(estimates: Sequence[Estimate]) -> list[Estimate]:
-    """The range of the bristle's stiffness and the bound of its damping."""
-    coulomb, _, damping = _bounds(estimates)
-    return [
-        Estimate("least_bristle_stiffness_n_m", coulomb / DEFLECTION_M[1], inf),
-        Estimate("largest_bristle_stiffness_n_m", coulomb / DEFLECTION_M[0], inf),
-        Estimate("largest_bristle_damping_n_s_m", damping, inf),
-    ]
-
-
-def _bristle(effect: StribeckFriction, estimates: Sequence[Estimate]) -> list[Estimate]:
-    """Break-away deflection and time of the bristle that keep the rule."""
-    if not isinstance(effect, BristleFriction):
-        return []
-    coulomb, static, largest = _bounds(estimates)
-    own = static / effect.breakaway_deflection_m
-    inside = coulomb / DEFLECTION_M[1] <= own <= coulomb / DEFLECTION_M[0]
-    stiffness = own if inside else coulomb / DEFLECTION_M[2]
-    damping = min(own * effect.bristle_time_s, largest)
-    return [
-        Estimate(f"{effect.name}.breakaway_deflection_m", static / stiffness, inf),
-        Estimate(f"{effect.name}.bristle_time_s", damping / stiffness, inf),
-    ]
 
 
 def _curve(law: _Law, found: Solution, runs: list[SteadyRun]) -> Curve:

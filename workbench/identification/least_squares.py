@@ -11,6 +11,7 @@ DIFFERENCE = 1e-3  # of the scale of an unknown: the integrator chooses its step
 ROOM = 0.1  # of the scale: a start stays that far inside its bounds
 MOST_EVALUATIONS = 60
 WEIGHINGS = 5  # of priors beside residuals, as large as the last search left them
+LOST = 1e-15  # of the largest information, as the pseudo-inverse counts it
 SAME_SIZE = 0.1  # of a mean square: closer is the same
 
 
@@ -78,9 +79,19 @@ def solve(
         begun = t
     information = rows.T @ rows / size + np.diag(priors**2)
     covariance = np.linalg.pinv(information) * np.outer(scale, scale)
-    unseen = np.diag(information) == 0.0  # what no residual depends on is not known at all
+    unseen = _unseen(information)
     covariance[unseen, unseen] = np.inf
     return Solution(start + scale * t, covariance, left)
+
+
+def _unseen(information: np.ndarray) -> np.ndarray:
+    """Which unknowns no residual depends on, (n,): they are not known at all.
+
+    The pseudo-inverse leaves such directions out, as if they were known exactly.
+    """
+    sizes, directions = np.linalg.eigh(information)
+    lost = directions[:, sizes <= LOST * sizes[-1]]
+    return (np.abs(lost) > 1e-3).any(axis=1)
 
 
 def _searched(

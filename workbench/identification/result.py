@@ -4,38 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from math import isfinite
+from math import isfinite, nan
 
 import numpy as np
 
 from workbench.errors import InputError, Message, listed
+from workbench.identification.estimate import Estimate, at_end, says_nothing
+from workbench.identification.notes import begins_with, kept_note, with_notes
 from workbench.recording import Recording
 from workbench.rig import Rig
 from workbench.units import public_name
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """A number that was identified, in SI; its name ends in its unit."""
-
-    name: str
-    value: float
-    deviation: float
-
-
-def estimated(
-    names: Iterable[str], values: Iterable[float], deviations: Iterable[float]
-) -> tuple[Estimate, ...]:
-    """Estimates from columns."""
-    rows = zip(names, values, deviations, strict=True)
-    return tuple(Estimate(name, float(value), float(spread)) for name, value, spread in rows)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Curve:
     """What was measured and what was fitted over a common axis, each of shape (n,).
 
-    ``at_bound`` names the curve's own values that ended at the end of their range.
+    ``at_bound`` names the curve's own values that ended at the end of their range.  ``noise`` is
+    the standard deviation of what was measured, NaN where the curve cannot be that close.
     """
 
     label: str
@@ -43,6 +29,12 @@ class Curve:
     measured: np.ndarray
     fitted: np.ndarray
     at_bound: tuple[str, ...] = ()
+    noise: float = nan
+
+    @property
+    def misfit(self) -> float:
+        """RMS of the residual in deviations of the noise, NaN where it cannot be one."""
+        return float(np.sqrt(np.mean(self.residual**2))) / self.noise
 
     @property
     def residual(self) -> np.ndarray:
@@ -71,6 +63,8 @@ class Identified:
         Measured and fitted, with the residuals.
     carried
         What an earlier procedure found and these values rely on: it goes along into another rig.
+    doubts
+        Sentences on what the recordings say against these values.
     """
 
     rig: Rig
@@ -78,6 +72,7 @@ class Identified:
     parameters: tuple[Estimate, ...]
     curves: tuple[Curve, ...]
     carried: tuple[Estimate, ...] = ()
+    doubts: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> Estimate:
         found = {each.name: each for each in (*self.estimates, *self.parameters)}
@@ -85,13 +80,28 @@ class Identified:
             raise KeyError(f"no {name} was identified; there are {', '.join(found)}")
         return found[name]
 
+    def beside(self, rig: Rig) -> tuple[Estimate, ...]:
+        """What goes into a rig along with the parameters; into another one what was carried."""
+        return () if rig is self.rig else self.carried
+
+    def taken(self, into: Rig | None = None) -> tuple[Estimate, ...]:
+        """The parameters that a rig takes over: that it has, does not fix, and that are results."""
+        rig = self.rig if into is None else into
+        return tuple(e for e in _there(rig, self.parameters) if not why_left(rig, e))
+
+    def left(self, into: Rig | None = None) -> dict[str, str]:
+        """Parameters of which a rig keeps its own value, by full name, and why."""
+        rig = self.rig if into is None else into
+        why = {e.name: why_left(rig, e) for e in _there(rig, self.parameters)}
+        return {name: said for name, said in why.items() if said}
+
     def improved(self, into: Rig | None = None, note: str = "") -> Rig:
         """The rig with what was found, and its standard deviations; the rest stays.
 
         ``into`` is another rig that has parameters of the same names, such as the drive whose valve
-        was measured on a tank.  A parameter that a rig fixes keeps its value.  A value beyond the
-        range of its parameter is taken at the end of the range, and a note says so.  A cause that
-        the rig file removed is back where its strength was identified.
+        was measured on a tank.  A parameter that a rig fixes keeps its value.  So does one whose
+        identified value ended at the end of its range, or says less than the rig knew: a note says
+        so.  A cause that the rig file removed is back where its strength was identified.
 
         Raises
         ------
@@ -99,28 +109,24 @@ class Identified:
             If the other rig has none of the parameters.
         """
         rig = self.rig if into is None else into
-        known = rig.plant.parameters
-        every = (*self.parameters, *(self.carried if into else ()))
-        taken = [e for e in every if e.name in known and e.name not in rig.fixed]
-        if not taken:
+        if not _there(rig, self.parameters):
             names = listed(public_name(each.name) for each in self.parameters)
             raise InputError(Message("takes none of what was identified", rig.name, names))
+        known = rig.plant.parameters
+        taken = (*self.taken(into), *_there(rig, self.beside(rig)))
         values = {
             e.name: min(max(e.value, known[e.name].lower), known[e.name].upper) for e in taken
         }
-        beyond = [
-            f"{public_name(e.name)} stands at the end of its range: identified was a value beyond"
-            for e in taken
-            if values[e.name] != e.value
-        ]
         deviations = {e.name: e.deviation for e in taken if isfinite(e.deviation)}
         strengths = {name: c.strength for name, c in rig.plant.candidates.items()}
+        said = [kept_note(name, why) for name, why in self.left(into).items()]
+        notes = [each for each in rig.notes if not begins_with(each, values)]
         return replace(
             rig,
             plant=rig.plant.with_values(values),
             removed=tuple(name for name in rig.removed if strengths[name] not in values),
             deviations={**rig.deviations, **deviations},
-            notes=_with_notes(rig.notes, *(self._earlier if into else ()), *beyond, note),
+            notes=with_notes(notes, *(self._earlier if into else ()), *said, note),
         )
 
     @property
@@ -128,6 +134,21 @@ class Identified:
         """What the rig says of where the carried values come from."""
         names = [public_name(each.name) for each in self.carried]
         return [note for note in self.rig.notes if any(name in note for name in names)]
+
+
+def _there(rig: Rig, found: Iterable[Estimate]) -> list[Estimate]:
+    """What a rig has a place for and does not fix."""
+    return [e for e in found if e.name in rig.plant.parameters and e.name not in rig.fixed]
+
+
+def why_left(rig: Rig, found: Estimate) -> str:
+    """Why a rig keeps its own value, or nothing."""
+    known = rig.plant.parameters[found.name]
+    if at_end(known, found.value):
+        return "what was identified stands at the end of its range"
+    if says_nothing(known, found, rig.standard_deviation(found.name)):
+        return "the recordings say nothing of it"
+    return ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -159,19 +180,16 @@ class Procedure:
     printed: Mapping[str, float] = field(default_factory=dict)
     run: Callable[[Rig, Sequence[Recording]], Identified]
 
-    def note(self, found: Identified, recordings: Sequence[Recording]) -> str:
-        """One line for the rig file: which values, from which recordings, by which method."""
-        names = listed(public_name(each.name) for each in found.parameters)
+    def note(
+        self, found: Identified, recordings: Sequence[Recording], into: Rig | None = None
+    ) -> str:
+        """One line for the rig file: which values it takes, from which recordings, by what method.
+
+        Nothing where the rig takes none of them.
+        """
+        names = ", ".join(public_name(each.name) for each in found.taken(into))
         read = listed((each.name for each in recordings), most=3)
-        return f"{self.name} identified {names} from {read}; {self.source}"
-
-
-def _with_notes(notes: tuple[str, ...], *new: str) -> tuple[str, ...]:
-    """The notes and new ones, each in place of what the same procedure said before."""
-    for note in filter(None, new):
-        begins = " ".join(note.split()[:2])
-        notes = (*(each for each in notes if not each.startswith(begins)), note)
-    return notes
+        return f"{self.name} identified {names} from {read}; {self.source}" if names else ""
 
 
 def known_before(rig: Rig, names: Iterable[str], first: str, why: str) -> None:

@@ -9,7 +9,7 @@ Source: paper 002 Eq. 9, Figs. 13 and 14; physics.md 5, rows S002-4 and S002-5.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -28,6 +28,9 @@ RESTING_M_S, MOVING_M_S = 2e-3, 20e-3
 LEAST_REST_S = 0.05
 LONGEST_CREEP_S = 0.5  # between the rest and the motion
 FORCE_SAMPLES = 5  # over which forces are averaged
+WAYS = (True, False)  # forward, back
+LEAST_BREAKS = 3  # of one direction, whose spread is one
+SPREAD = 0.05  # of a break-away force, where too few tell it: that over the stroke of a real seal
 
 
 @dataclass(frozen=True)
@@ -144,6 +147,33 @@ def break_aways(moved: Motion) -> tuple[BreakAway, ...]:
         size = float(np.max(near))
         found.append(BreakAway(float(moved.position_m[since[-1]]), forward, size))
     return tuple(found)
+
+
+def breaking_forces(breaks: Sequence[BreakAway]) -> list[tuple[bool, float, float]]:
+    """Direction, mean force and the deviation of that mean, of each direction that broke away.
+
+    The spread over few is that of the other direction, or else a usual one: one break-away has
+    none, and two may agree by chance.
+    """
+    every = [(way, np.array([b.force_n for b in breaks if b.forward == way])) for way in WAYS]
+    told = [np.std(n, ddof=1) / np.mean(n) for _, n in every if len(n) >= LEAST_BREAKS]
+    usual = float(np.mean(told)) if told else SPREAD
+    found = []
+    for forward, sizes in (row for row in every if len(row[1])):
+        own_n = float(np.std(sizes, ddof=1)) if len(sizes) > 1 else 0.0
+        few_n = usual * float(np.mean(sizes)) if len(sizes) < LEAST_BREAKS else 0.0
+        spread_n = max(own_n, few_n) / np.sqrt(len(sizes))
+        found.append((forward, float(np.mean(sizes)), float(spread_n)))
+    return found
+
+
+def speeds(runs: Sequence[SteadyRun], forward: bool) -> int:
+    """How many different speeds the runs of one direction have; closer than steady is the same."""
+    count, last = 0, 0.0
+    for speed in sorted(abs(r.velocity_m_s) for r in runs if (r.velocity_m_s > 0) == forward):
+        if speed > (1.0 + STEADY) * last:
+            count, last = count + 1, speed
+    return count
 
 
 def _averaged(values: np.ndarray, width: int) -> np.ndarray:

@@ -8,15 +8,13 @@ the end of its range a value is no result, and its deviation says nothing.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf, isnan, nan
+from math import isnan, nan
 
 from workbench.diagnosis.judge import LEAST_SIZE
-from workbench.effect import Parameter
-from workbench.identification.result import Estimate
+from workbench.identification.estimate import Estimate, end_reached, says_nothing
 from workbench.rig import Rig
 
 FAR = 5.0  # prior deviations
-AT_BOUND = 1e-3  # of the range, or of the typical size where that is smaller: solvers stop before
 
 
 @dataclass(frozen=True)
@@ -30,10 +28,16 @@ class Standing:
         has none.
     end
         The end of its range, in SI, at or beyond which it lies; NaN where it lies within.
+    none
+        Whether that end is where nothing of it is there, which may be so.
+    silent
+        Whether the recordings say nothing of it.
     """
 
     deviations_off: float
     end: float
+    none: bool = False
+    silent: bool = False
 
     @property
     def at_bound(self) -> bool:
@@ -52,12 +56,6 @@ def standing(rig: Rig, found: Estimate) -> Standing:
     if prior > 0.0 and known.null is not None and found.name not in rig.deviations:
         prior = max(prior, LEAST_SIZE * abs(known.typical))  # nothing to know of a weaker one
     off = abs(found.value - rig.plant.values[found.name]) / prior if prior > 0.0 else nan
-    return Standing(off, end_reached(known, found.value))
-
-
-def end_reached(known: Parameter, value: float) -> float:
-    """The end of a parameter's range that a value in SI has come to or passed, else NaN."""
-    room = AT_BOUND * min(known.upper - known.lower, abs(known.typical) or inf)
-    if value <= known.lower + room:
-        return known.lower
-    return known.upper if value >= known.upper - room else nan
+    end = end_reached(known, found.value)
+    silent = says_nothing(known, found, rig.standard_deviation(found.name))
+    return Standing(off, end, end == known.null, silent)

@@ -21,26 +21,20 @@ E002-4, which the flow law of the plant has); physics.md 5, row S002-1.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from math import isfinite
 
 import numpy as np
 
 from workbench.fitting.noise import measured_noise
+from workbench.identification.estimate import Estimate, estimated
 from workbench.identification.least_squares import Solution, Unknown, solve
-from workbench.identification.result import (
-    Curve,
-    Estimate,
-    Identified,
-    Procedure,
-    complete,
-    estimated,
-    known_before,
-)
+from workbench.identification.result import Procedure, complete, known_before
 from workbench.identification.runs import outputs_under
+from workbench.identification.settled import settled
 from workbench.identification.standing import end_reached
 from workbench.identification.tank import tank_on_valve
-from workbench.identification.tank_pieces import LEAST_OPEN, Piece, open_sides, tank_pieces
+from workbench.identification.tank_flow import FlowFit, TankCurve, ValveNames
+from workbench.identification.tank_pieces import LEAST_OPEN, Piece, open_commands, tank_pieces
 from workbench.plant import Plant
 from workbench.recording import Recording
 from workbench.rig import Rig
@@ -54,62 +48,6 @@ SCALES = {
     "subsonic_index": 0.05,
 }
 TYPICAL_ERROR_PA = 4e3  # 0.04 bar, what the paper reports
-
-
-@dataclass(frozen=True, kw_only=True)
-class TankCurve(Curve):
-    """One curve: pressure over time from the opening on.
-
-    ``area_m2`` is the effective area C_d A(u); all are estimates with their deviations.
-    """
-
-    command_v: float
-    charging: bool
-    area_m2: Estimate
-    critical_ratio: Estimate
-    cracking_ratio: Estimate
-    subsonic_index: Estimate
-
-    @property
-    def shape(self) -> dict[str, Estimate]:
-        """The shape of the flow function, by the letters of the paper."""
-        return {"b": self.critical_ratio, "a": self.cracking_ratio, "m": self.subsonic_index}
-
-
-@dataclass(frozen=True, kw_only=True)
-class FlowFit(Identified):
-    """Flow parameters per path and command, and the errors that the rig's few parameters leave.
-
-    ``rig_errors_pa`` is the MAE of each curve with the improved rig, in the order of ``curves``.
-    """
-
-    curves: tuple[TankCurve, ...]
-    rig_errors_pa: tuple[float, ...]
-
-
-@dataclass(frozen=True)
-class _Names:
-    """Full names of the parameters of valve and dead zone."""
-
-    valve: str
-    zone: str
-
-    def shape(self, charging: bool) -> list[str]:
-        """Area, b, a and m of a path."""
-        side = "supply" if charging else "exhaust"
-        keys = (f"{side}_fraction", f"{side}_critical_ratio", "cracking_ratio", "subsonic_index")
-        return [f"{self.valve}.{key}" for key in keys]
-
-    @property
-    def before(self) -> list[str]:
-        """What must be known before, and stays."""
-        zone = [f"{self.zone}.{key}" for key in ("centre_v", "half_width_v")]
-        return [*zone, f"{self.valve}.leak_area_m2"]
-
-    @property
-    def common(self) -> list[str]:
-        """The rig's own parameters that all curves share."""
-        return [f"{self.valve}.area_exponent", *self.shape(True), *self.shape(False)[:2]]
 
 
 def tank_curves(
@@ -127,7 +65,7 @@ def tank_curves(
     """
     complete(recordings)
     tank = tank_on_valve(rig, recordings[0])
-    plant, names = tank.plant, _Names(tank.valve, tank.zone)
+    plant, names = tank.plant, ValveNames(tank.valve, tank.zone)
     why = "the flow of a path is right only behind the right dead zone"
     known_before(rig, names.before, "dead-zone", why)
     pieces = tank_pieces(tank, recordings)
@@ -138,17 +76,18 @@ def tank_curves(
         curves.append(_curve(plant, names, piece, noise))
     progress("all curves at once")
     shared = [name for name in _shown(names, pieces) if name not in rig.fixed]
-    common = _common(plant, shared, pieces)
+    shared, common, doubts = settled(rig, shared, lambda names: _common(plant, names, pieces))
     ends = np.cumsum([len(piece.recording) for piece in pieces])[:-1]
     return FlowFit(
         rig=rig,
         estimates=(_mean_error(curves),),
         parameters=estimated(shared, common.values[:-1], common.deviations[:-1]),
         carried=tuple(
-            Estimate(name, rig.plant.values[name], rig.deviations[name])
+            Estimate(name, rig.plant.values[name], rig.deviations.get(name, 0.0))
             for name in names.before
-            if name in rig.deviations
         ),
+        names=names,
+        doubts=doubts,
         curves=tuple(curves),
         rig_errors_pa=tuple(
             float(np.mean(np.abs(left))) for left in np.split(common.residuals, ends)
@@ -156,9 +95,9 @@ def tank_curves(
     )
 
 
-def _shown(names: _Names, pieces: list[Piece]) -> list[str]:
+def _shown(names: ValveNames, pieces: list[Piece]) -> list[str]:
     """The rig's parameters that the curves say something of: a path needs some of its own."""
-    missing = [side for side in (True, False) if len(open_sides(pieces, side)) < LEAST_OPEN]
+    missing = [side for side in (True, False) if open_commands(pieces, side) < LEAST_OPEN]
     silent = {name for side in missing for name in names.shape(side)[:2]}
     return [name for name in names.common if name not in silent]
 
@@ -172,7 +111,7 @@ def _delayed(values: np.ndarray, time_s: np.ndarray, dead_time_s: float) -> np.n
     return np.interp(time_s - dead_time_s, time_s, values)
 
 
-def _curve(plant: Plant, names: _Names, piece: Piece, noise: float) -> TankCurve:
+def _curve(plant: Plant, names: ValveNames, piece: Piece, noise: float) -> TankCurve:
     """Area, b, a and m of one curve, the plant at full command of its side."""
     shape, recording = names.shape(piece.charging), piece.recording
     signal, channel = plant.commands[0], plant.measured[0]
@@ -202,6 +141,7 @@ def _curve(plant: Plant, names: _Names, piece: Piece, noise: float) -> TankCurve
         along=time_s,
         measured=measured,
         fitted=measured - found.residuals,
+        noise=noise,
         command_v=piece.command_v,
         charging=piece.charging,
         at_bound=tuple(k for k, name, x in shapes if isfinite(end_reached(known[name], x))),
@@ -209,7 +149,7 @@ def _curve(plant: Plant, names: _Names, piece: Piece, noise: float) -> TankCurve
     )
 
 
-def _common(plant: Plant, names: list[str], pieces: list[Piece]) -> Solution:
+def _common(plant: Plant, names: Sequence[str], pieces: list[Piece]) -> Solution:
     """The rig's own parameters, fitted to all curves at once with one dead time.
 
     The dead zone stays: one law of area for all commands would bend its limits to fit better.

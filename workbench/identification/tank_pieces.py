@@ -20,7 +20,8 @@ CLEARLY_V = 0.2  # that far outside the dead zone a path is open
 LEAST_RISE = 0.1  # of supply minus ambient, with an open path
 RESTING = 0.002  # of the same, within the last fifth: the tank has come to rest
 RESTS = 0.02  # of the way: from where on a curve is logged for as long again
-LEAST_OPEN = 3  # curves with one path open: its size, its shape and the curve of its area
+LEAST_OPEN = 3  # commands with one path open: its size, its shape and the curve of its area
+APART_V = 0.1  # commands closer than that tell the same
 
 
 @dataclass(frozen=True)
@@ -44,10 +45,11 @@ def tank_pieces(tank: TankOnValve, recordings: Sequence[Recording]) -> list[Piec
     """
     found = [_piece(tank, piece) for each in recordings for piece in each.pieces]
     counts = [len(open_sides(found, side)) for side in (True, False)]
-    if max(counts) < LEAST_OPEN:
+    if max(open_commands(found, side) for side in (True, False)) < LEAST_OPEN:
         what = f"{counts[0]} charging and {counts[1]} discharging curves give no flow parameters"
         source = ", ".join(dict.fromkeys(each.source or each.name for each in recordings))
-        expected = f"{LEAST_OPEN} or more on one side, {CLEARLY_V:g} V or more off the dead zone"
+        expected = f"{LEAST_OPEN} or more on one side at different commands, "
+        expected += f"{CLEARLY_V:g} V or more off the dead zone"
         raise InputError(Message(what, expected=expected, file=source))
     return found
 
@@ -55,6 +57,12 @@ def tank_pieces(tank: TankOnValve, recordings: Sequence[Recording]) -> list[Piec
 def open_sides(pieces: Sequence[Piece], charging: bool) -> list[Piece]:
     """The curves of one side whose path is open."""
     return [each for each in pieces if each.charging == charging and each.is_open]
+
+
+def open_commands(pieces: Sequence[Piece], charging: bool) -> int:
+    """At how many different commands the path of one side is open."""
+    sent_v = sorted(each.command_v for each in open_sides(pieces, charging))
+    return sum(not k or v - sent_v[k - 1] > APART_V for k, v in enumerate(sent_v))
 
 
 def _piece(tank: TankOnValve, recording: Recording) -> Piece:

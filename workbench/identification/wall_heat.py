@@ -18,46 +18,33 @@ Source: paper 002 Eqs. 16 to 19, Fig. 12, Table 4; physics.md 5, row S002-3.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import nan
 
 import casadi as ca
 import numpy as np
 
 from workbench.effects import ConstantWallHeat
-from workbench.fitting.noise import measured_noise
-from workbench.identification.held_gas import (
-    STILL_M,
-    geometry,
-    held_position_m,
-    kept_share,
-    plugged,
-    position_channel,
-    pressed_chamber,
-)
+from workbench.identification.decay import Decay, check_plugged, start_state, thermal_decay
+from workbench.identification.estimate import Estimate, estimated
 from workbench.identification.least_squares import Solution, Unknown, solve
 from workbench.identification.result import (
     Curve,
-    Estimate,
     Identified,
     Procedure,
     complete,
-    estimated,
     known_before,
     unfit,
 )
 from workbench.identification.runs import outputs_under
-from workbench.parts import Chamber
 from workbench.plant import Plant
 from workbench.recording import Recording
 from workbench.rig import Rig
-from workbench.vessel import Vessel
 
-LATER_S = 0.02  # after the stop: sensors and the piston have come to rest
-LEAST_NOISE = 10.0  # noise deviations that the pressure must decay by
 LEAST_TIME_CONSTANTS = 3.0
-MOST_HEATED = 2.0  # temperature behind the stop over that of the wall, or the inverse
-MOST_LOST = 0.3  # of the gas: more is no leak of a plugged chamber
 TYPICAL_LEAK_M2 = 1e-9
+LEAST = 1e-30  # of a deviation that is divided by
+CLEARLY = 2.5  # times what their deviations say: decays contradict each other
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,21 +52,6 @@ class WallHeatFit(Identified):
     """Time constant, conductance and coefficients; ``curves`` hold exponential and pressure."""
 
     chamber: str
-
-
-@dataclass(frozen=True)
-class _Decay:
-    """One decay: the pressure from the stop on, and the vessel it happens in.
-
-    ``kept`` is the gas that is there at the end over that before the push, both at the temperature
-    of the wall; 1 where no piston moves.
-    """
-
-    recording: Recording
-    vessel: Plant
-    channel: str
-    noise: float
-    kept: float
 
 
 def wall_heat(rig: Rig, recordings: Sequence[Recording]) -> WallHeatFit:
@@ -93,80 +65,35 @@ def wall_heat(rig: Rig, recordings: Sequence[Recording]) -> WallHeatFit:
     """
     complete(recordings)
     plant = rig.fit_for(recordings[0])
-    decays = [_decay(plant, each) for each in recordings]
+    decays = [thermal_decay(plant, each) for each in recordings]
     _check_volumes(rig, decays)
     for each in decays:
-        _check_plugged(each)
+        check_plugged(each)
     tops = [_exponential(each) for each in decays]
     name = _coefficient(decays[0].vessel)
     fits = [_fitted(each, name) for each in decays]
-    coefficient = _together([Estimate(name, f.values[0], f.deviations[0]) for f in fits])
+    each_own = [Estimate(name, f.values[0], f.deviations[0]) for f in fits]
+    coefficient, apart = _together(each_own)
+    by_volume = _by_volume(rig, decays, each_own)
+    deviation = float(np.hypot(coefficient.deviation, by_volume))
     return WallHeatFit(
         rig=rig,
         estimates=_paper_chain(decays[0], tops[0], coefficient),
-        parameters=(coefficient,),
+        parameters=(replace(coefficient, deviation=deviation),),
+        doubts=_contradictions(each_own, apart),
         curves=tuple(c for rows in zip(decays, tops, fits, strict=True) for c in _curves(*rows)),
-        chamber=decays[0].channel.partition(".")[0],
+        chamber=decays[0].chamber,
     )
 
 
-def _check_volumes(rig: Rig, decays: Sequence[_Decay]) -> None:
+def _check_volumes(rig: Rig, decays: Sequence[Decay]) -> None:
     """The gas that cools is that of the whole volume; a vessel's is the rig's own."""
-    dead = {f"{each.channel.partition('.')[0]}.dead_volume_m3" for each in decays}
+    dead = {f"{each.chamber}.dead_volume_m3" for each in decays}
     why = "the gas that cools is that of the whole volume"
     known_before(rig, sorted(dead & set(rig.plant.values)), "dead-volume", why)
 
 
-def _check_plugged(decay: _Decay) -> None:
-    """Refuse what a valve fills or empties: that comes to rest like an exponential too.
-
-    The gas of a plugged chamber stays there, and its pressure falls or rises by its temperature
-    alone.
-    """
-    measured = decay.recording[decay.channel]
-    n = max(len(measured) // 20, 1)
-    first, last = float(measured[0]), float(measured[-n:].mean())
-    if abs(decay.kept - 1.0) > MOST_LOST:
-        what = f"{decay.kept:.0%} of the gas before the push is there at the end"
-    elif not 1.0 / MOST_HEATED < first / last < MOST_HEATED:
-        what = f"{first / 1e5:.2g} bar that come to {last / 1e5:.2g} bar are more than heat does"
-    else:
-        return
-    expected = "both ports of the chamber plugged, so that its gas stays"
-    raise unfit(decay.recording, f"is no thermal decay: {what}", expected)
-
-
-def _decay(plant: Plant, recording: Recording) -> _Decay:
-    """The part of a recording after the push, checked."""
-    chamber = pressed_chamber(plant, recording)
-    channel = f"{chamber.name}.pressure_pa"
-    noise = measured_noise([recording], [channel])[channel]
-    held_m = held_position_m(chamber, recording)
-    volume, surface = geometry(plant, chamber, held_m)
-    rest = recording.part(_stopped(chamber, recording, held_m), len(recording))
-    pressure = rest[channel] if len(rest) else np.zeros(1)
-    n = max(len(rest) // 20, 1)
-    fallen_pa = abs(float(np.mean(pressure[:n]) - np.mean(pressure[-n:])))
-    if len(rest) < 50 or fallen_pa < LEAST_NOISE * noise:
-        what = f"is no thermal decay: {chamber.name} moves by {fallen_pa / 1e5:.2g} bar after it"
-        expected = f"a decay of at least {LEAST_NOISE * noise / 1e5:.2g} bar, logged to its end"
-        raise unfit(recording, what, expected)
-    kept = kept_share(plant, chamber, recording, volume, float(np.mean(pressure[-n:])))
-    return _Decay(rest, plugged(plant, chamber, volume, surface), channel, noise, kept)
-
-
-def _stopped(chamber: Chamber | Vessel, recording: Recording, held_m: float) -> int:
-    """The sample at which a pushed piston and its sensors have come to rest; 0 of a vessel."""
-    if isinstance(chamber, Vessel):
-        return 0
-    moving = np.flatnonzero(np.abs(recording[position_channel(chamber)] - held_m) > STILL_M)
-    expected = "a piston pushed quickly and then held, both ports of its chamber plugged"
-    if not len(moving):
-        raise unfit(recording, "is no thermal decay: the piston never moves", expected)
-    return int(moving[-1]) + 1 + round(LATER_S / recording.sample_time_s)
-
-
-def _exponential(decay: _Decay) -> Solution:
+def _exponential(decay: Decay) -> Solution:
     """p_f, dp and tau of the exponential."""
     time_s, measured = decay.recording.time_s, decay.recording[decay.channel]
     n = max(len(measured) // 20, 1)
@@ -188,20 +115,8 @@ def _exponential(decay: _Decay) -> Solution:
     return found
 
 
-def _state(decay: _Decay, pressure_pa: float, end_pa: float) -> np.ndarray:
-    """Vessel state at a pressure, with the mass of gas that is at wall temperature at the end."""
-    vessel, volume = decay.vessel, next(p for p in decay.vessel.parts if hasattr(p, "volume_m3"))
-    x = vessel.initial.copy()
-    states = list(vessel.state_list)
-    x[states.index(decay.channel)] = pressure_pa
-    mass = f"{volume.name}.mass_kg"
-    if mass in states:
-        x[states.index(mass)] = volume.mass_at(end_pa, volume.volume_m3)
-    return x
-
-
 def _paper_chain(
-    decay: _Decay, exponential: Solution, coefficient: Estimate
+    decay: Decay, exponential: Solution, coefficient: Estimate
 ) -> tuple[Estimate, ...]:
     """Time constant, conductance and coefficient of the chain; time constant of the fitted law."""
     tau, share = exponential.values[2], exponential.deviations[2] / exponential.values[2]
@@ -216,7 +131,7 @@ def _paper_chain(
     return (*estimated(names, found, share * found), known)
 
 
-def _per_coefficient(decay: _Decay, end_pa: float) -> tuple[float, float]:
+def _per_coefficient(decay: Decay, end_pa: float) -> tuple[float, float]:
     """1 / tau and conductance for a coefficient of one, at the end of the decay.
 
     1 / tau = -d(p')/dp at constant mass; both are proportional to the coefficient there.
@@ -229,7 +144,7 @@ def _per_coefficient(decay: _Decay, end_pa: float) -> tuple[float, float]:
     slopes = [ca.gradient(e, x)[at] for e in (model.rates[at], heat, temperature)]
     own = vessel.nominal[2].copy()
     own[model.parameters.index(name)] = 1.0
-    point = _state(decay, end_pa, end_pa), *vessel.nominal[:2], own
+    point = start_state(decay, end_pa, end_pa), *vessel.nominal[:2], own
     rate, watt, kelvin = map(float, ca.Function("slopes", [*model.symbols], slopes)(*point))
     return -rate, -watt / kelvin
 
@@ -239,7 +154,7 @@ def _coefficient(vessel: Plant) -> str:
     return f"{heat.name}.coefficient_w_m2_k"
 
 
-def _fitted(decay: _Decay, name: str) -> Solution:
+def _fitted(decay: Decay, name: str) -> Solution:
     """Coefficient, pressure at the stop, pressure at the end, and leak, by simulation."""
     measured = decay.recording[decay.channel]
     run = outputs_under(decay.vessel, decay.recording, [name, "chamber_leak.area_m2"])
@@ -253,29 +168,74 @@ def _fitted(decay: _Decay, name: str) -> Solution:
         Unknown(0.0, TYPICAL_LEAK_M2, 0.0),
     ]
     return solve(
-        lambda x: measured - run(x[[0, 3]], _state(decay, x[1], x[2]))[0], unknowns, decay.noise
+        lambda x: measured - run(x[[0, 3]], start_state(decay, x[1], x[2]))[0],
+        unknowns,
+        decay.noise,
     )
 
 
-def _curves(decay: _Decay, exponential: Solution, fit: Solution) -> list[Curve]:
+def _curves(decay: Decay, exponential: Solution, fit: Solution) -> list[Curve]:
     time_s, measured = decay.recording.time_s, decay.recording[decay.channel]
-    rows = (("exponential", exponential), ("heat law", fit))
+    rows = (("exponential", exponential, nan), ("heat law", fit, decay.noise))
     return [
         Curve(
             label=f"{decay.recording.name}, {label}",
             along=time_s,
             measured=measured,
             fitted=measured - found.residuals,
+            noise=noise,
         )
-        for label, found in rows
+        for label, found, noise in rows
     ]
 
 
-def _together(found: list[Estimate]) -> Estimate:
-    """The mean of estimates of one number, weighted by what is known of each."""
-    weights = np.array([1.0 / max(each.deviation, 1e-30) ** 2 for each in found])
-    mean = float(weights @ [each.value for each in found] / weights.sum())
-    return Estimate(found[0].name, mean, float(weights.sum() ** -0.5))
+def _together(found: list[Estimate]) -> tuple[Estimate, float]:
+    """The mean of estimates of one number, and how many of their deviations they lie apart.
+
+    Weighted by what is known of each; where they lie further apart than that, the mean is known so
+    much worse.
+    """
+    weights = _weights(found)
+    values = np.array([each.value for each in found])
+    mean = float(weights @ values)
+    off = (values - mean) / [max(each.deviation, LEAST) for each in found]
+    apart = float(np.sqrt(off @ off / max(len(found) - 1, 1)))
+    alone = float(np.sum([max(each.deviation, LEAST) ** -2.0 for each in found]) ** -0.5)
+    return Estimate(found[0].name, mean, max(apart, 1.0) * alone), apart
+
+
+def _weights(found: list[Estimate]) -> np.ndarray:
+    weights = np.array([max(each.deviation, LEAST) ** -2.0 for each in found])
+    return weights / weights.sum()
+
+
+def _contradictions(found: list[Estimate], apart: float) -> tuple[str, ...]:
+    """What to say of decays that tell of different coefficients."""
+    if apart < CLEARLY:
+        return ()
+    low, high = (pick(each.value for each in found) for pick in (min, max))
+    said = (
+        f"the {len(found)} decays contradict each other, {low:.4g} to {high:.4g} W/(m^2 K), "
+        f"{apart:.2g} times what their deviations say: is the dead volume right, and was the "
+        "piston held still?"
+    )
+    return (said,)
+
+
+def _by_volume(rig: Rig, decays: list[Decay], found: list[Estimate]) -> float:
+    """What the mean moves by at dead volumes that are larger by their deviation.
+
+    Every decay of one chamber moves along; the chambers' volumes are known independently.
+    """
+    moved = dict.fromkeys((each.chamber for each in decays), 0.0)
+    for decay, own, weight in zip(decays, found, _weights(found), strict=True):
+        name = f"{decay.chamber}.dead_volume"
+        more_m3 = rig.deviations.get(f"{name}_m3", 0.0)
+        if more_m3:
+            change = 1.0 + rig.plant.values.get(f"{name}_change", 0.0)
+            larger = _fitted(decay.larger_by(change * more_m3), own.name).values[0]
+            moved[decay.chamber] += float(weight * (larger - own.value))
+    return float(np.linalg.norm(list(moved.values())))
 
 
 PROCEDURE = Procedure(
