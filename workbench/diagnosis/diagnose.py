@@ -19,6 +19,7 @@ from workbench.diagnosis.evidence import WARNINGS, held_out, weighed
 from workbench.diagnosis.follow import follow
 from workbench.diagnosis.judge import (
     CERTAIN_SHARE,
+    LITTLE_LEFT,
     SHARE_REASON,
     clearly_less,
     share_removed,
@@ -177,7 +178,9 @@ def _law(
         max((r.drop_train for r in followed if r.kind is kind), default=0.0)
         for kind in (Kind.EFFECT, Kind.PARAMETER)
     )
-    if law is None or not clearly_less(1.0 - law.drop_train, 1.0 - effect):
+    if law is None:
+        return None
+    if not clearly_less(*(max(1.0 - drop, LITTLE_LEFT) for drop in (law.drop_train, effect))):
         return None
     return law if law.drop_train > shift else None
 

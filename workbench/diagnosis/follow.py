@@ -13,11 +13,14 @@ from dataclasses import dataclass
 
 from workbench.diagnosis.judge import (
     CLOSE_DROP_SAME,
+    LEAST_PROXY,
     LEAST_TRAINING,
     SAME_DIRECTION,
+    SHARE_REASON,
     alignment,
     predicts,
     reasons_against,
+    share_removed,
 )
 from workbench.diagnosis.refit import (
     Refit,
@@ -155,9 +158,18 @@ def _shaken(problem: Problem, refits: Sequence[Refit]) -> list[Refit]:
 
 
 def _best_first(problem: Problem, refits: Sequence[Refit]) -> list[Refit]:
-    """The accepted ones first, then those that predict, the largest drop first."""
-    against = {id(each): bool(reasons_against(problem.base, each)) for each in refits}
-    return sorted(refits, key=lambda r: (against[id(r)], not predicts(r), -r.drop_train))
+    """The accepted ones first, then what fails by its share alone, then those that predict.
+
+    Among these the largest drop first.
+    """
+    against = {id(each): reasons_against(problem.base, each) for each in refits}
+
+    def order(each: Refit) -> tuple[int, bool, float]:
+        small = against[id(each)] == (SHARE_REASON,) and share_removed(each) > LEAST_PROXY
+        refused = 1 if small else 2
+        return refused if against[id(each)] else 0, not predicts(each), -each.drop_train
+
+    return sorted(refits, key=order)
 
 
 def _from_the_leader(

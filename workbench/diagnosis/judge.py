@@ -11,7 +11,8 @@ the criterion.  A candidate is accepted when
 3. at least 20 % of the misfit beyond noise goes away, as the mean over training and held-out
    recordings and with no less than 10 % in training: less may stand for something else,
 4. its size is inside its bounds, more than 3 % of typical, and more than two standard deviations
-   from none, as the curvature of the cost tells these.
+   from none, as the curvature of the cost tells these; of a parameter that is there already, from
+   what is believed of it.
 
 A pair pays for the parameters of both, takes twice the share, and both sizes must be sound.
 """
@@ -72,7 +73,7 @@ def reasons_against(base: Fit, refit: Refit, parameters: int = 0) -> tuple[str, 
     each = len(refit.candidate.singles)
     if share_removed(refit) < each * LEAST_SHARE or refit.drop_train < each * LEAST_TRAINING:
         against.append(SHARE_REASON if each == 1 else f"{SHARE_REASON} each")
-    return (*against, *_size_reasons(refit))
+    return (*against, *size_reasons(base, refit))
 
 
 def predicts(refit: Refit) -> bool:
@@ -103,9 +104,8 @@ def too_few(held_out: Fit | None) -> bool:
 
 def share_removed(found: Refit | Law | Ranked) -> float:
     """Share of the misfit that goes away, mean of training and held-out."""
-    if isnan(found.drop_validation):
-        return found.drop_train
-    return (found.drop_train + found.drop_validation) / 2
+    train = min(found.drop_train, 1.0)
+    return train if isnan(found.drop_validation) else (train + min(found.drop_validation, 1.0)) / 2
 
 
 def _bic_gain(base: Fit, fit: Fit, parameters: int) -> float:
@@ -119,22 +119,24 @@ def effective_samples(fit: Fit) -> float:
     return float(effective_by_output(fit.windows).sum())
 
 
-def _size_reasons(refit: Refit) -> list[str]:
+def size_reasons(base: Fit, found: Refit | Ranked) -> list[str]:
     """Size criteria: not negligible, not at a bound."""
-    return [why for each in refit.candidate.singles for why in _reasons_of_size(refit, each)]
+    return [why for each in found.candidate.singles for why in _reasons_of_size(base, found, each)]
 
 
-def _reasons_of_size(refit: Refit, candidate: Candidate) -> list[str]:
-    name = candidate.strength if candidate.strength in refit.size else candidate.held
-    if name not in refit.size:
+def _reasons_of_size(base: Fit, found: Refit | Ranked, candidate: Candidate) -> list[str]:
+    """Of what is there already, a shift, the size is how far it goes from what is believed."""
+    name = candidate.strength if candidate.strength in found.size else candidate.held
+    if name not in found.size or found.fit is None:
         return []
-    known = refit.fit.plant.parameters[name]
-    size = refit.size[name].value
-    null = known.null or 0.0
+    known, there = found.fit.plant.parameters[name], base.unknowns
+    size, null = found.size[name].value, known.null or 0.0
+    if name in there.names and there.with_prior[there.names.index(name)]:
+        null = float(there.prior[there.names.index(name)])
     reasons = []
     if abs(size - null) < LEAST_SIZE * abs(known.typical):
         reasons.append("its size is negligible")
-    elif not distinct(refit.size[name], null):
+    elif not distinct(found.size[name], null):
         reasons.append("its size is not distinct from none")
     ends = (end for end in (known.lower, known.upper) if end not in (null, known.typical))
     if any(isclose(size, end, rel_tol=AT_BOUND, abs_tol=0.0) for end in ends):
@@ -234,7 +236,7 @@ def _refused_by_few(other: Refit, best: Refit) -> bool:
     """
     if not other.drop_validation > LEAST_HELD_OUT:
         return False
-    more = clearly_less(1.0 - other.drop_train, 1.0 - best.drop_train)
+    more = clearly_less(*(max(1.0 - each.drop_train, LITTLE_LEFT) for each in (other, best)))
     return more and not clearly_less(left_held_out(best), left_held_out(other))
 
 

@@ -97,11 +97,18 @@ class Metric:
 
 
 def metric_at(
-    windows: Windows, unknowns: Unknowns, point: Point, at: Linearised | None = None
+    windows: Windows,
+    unknowns: Unknowns,
+    point: Point,
+    at: Linearised | None = None,
+    each: float = 1.0,
 ) -> Metric:
-    """The metric M at a point, from derivatives there or from one batch of simulations."""
+    """The metric M at a point, from derivatives there or from one batch of simulations.
+
+    ``each`` is how many windows one stands for: what it says of costs counts as often.
+    """
     at = at or linearise(windows, unknowns, point)
-    return Metric(at, normal_equations(at, unknowns))
+    return Metric(at, normal_equations(at, unknowns, each=each))
 
 
 def every_second(
@@ -111,4 +118,5 @@ def every_second(
     total = len(windows)
     windows, kept = windows.part(max(total // 2, FEWEST_WINDOWS))
     point, at = replace(point, starts=point.starts[:, kept]), at.part(kept) if at else None
-    return windows, point, metric_at(windows, unknowns, point, at), total / len(windows)
+    of_all = total / len(windows)
+    return windows, point, metric_at(windows, unknowns, point, at, of_all), of_all

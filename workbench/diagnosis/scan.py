@@ -82,6 +82,13 @@ class Profile:
         """Fall of the projected cost at the best size; 0 where no size helps."""
         return max(self.trials[0].drop, 0.0)
 
+    def times(self, count: float) -> Profile:
+        """The same where each window stands for so many."""
+        trials = (
+            replace(each, drop=count * each.drop, shown=count * each.shown) for each in self.trials
+        )
+        return replace(self, trials=tuple(trials), drop_wide=count * self.drop_wide)
+
 
 def scan(
     whole: Plant,
@@ -101,7 +108,7 @@ def scan(
     there are many; drops, in weighted squares, count as of all.
     """
     windows, point, metric, of_all = every_second(windows, unknowns, point, at)
-    wide = metric_at(windows, unknowns.loosened(WIDER), point, metric.at)
+    wide = metric_at(windows, unknowns.loosened(WIDER), point, metric.at, of_all)
     blind = blind_starts(windows.plant, metric.at)
     values = unknowns.values(point.t)
     profiles = []
@@ -140,14 +147,15 @@ def scan_from_priors(problem: Problem) -> list[Profile]:
     Parameters that imitate an effect hide it from a scan at the prior fit: what an underlap lets
     through, a leak and another heat flow together do too, several deviations off their priors, or
     within them where they are wide.
-    Its leaders alone are asked for: a quarter of the windows are enough, and drops count as of
-    these.
+    Its leaders alone are asked for: a quarter of the windows are enough, each for all that it
+    stands for.
     """
     base = problem.base
     windows, kept = base.windows.part(max(len(base.windows) // 4, FEWEST_FROM_PRIORS))
     point = Point(problem.at_priors, base.point.starts[:, kept])
     absent, fixed = _absent(problem), problem.rig.fixed
-    return scan(problem.whole, windows, base.unknowns, point, absent, fixed=fixed)
+    found = scan(problem.whole, windows, base.unknowns, point, absent, fixed=fixed)
+    return [profile.times(len(base.windows) / len(windows)) for profile in found]
 
 
 def _absent(problem: Problem) -> list[Candidate]:

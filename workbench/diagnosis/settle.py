@@ -17,7 +17,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from workbench.candidate import Candidate
-from workbench.diagnosis.judge import MOST_PLAIN
+from workbench.diagnosis.judge import MOST_PLAIN, size_reasons
 from workbench.diagnosis.refit import ITERATIONS
 from workbench.diagnosis.result import Ranked
 from workbench.diagnosis.size import Size, sizes
@@ -63,10 +63,10 @@ def settled_leader(fit: Fit, candidate: Candidate) -> Fit:
 
 
 def _settled_row(problem: Problem, row: Ranked, leads: bool) -> Ranked:
-    """The row with its size settled; as it was where held-out recordings are predicted worse so.
+    """The row with its size settled; as it was where that would no longer pass.
 
-    What was accepted for predicting better than the base is not to be told with a fit that does
-    not.
+    What was accepted for predicting better than the base, and for its size, is not to be told with
+    a fit that does not.
     """
     fit = (settled_leader if leads else settled)(row.fit, row.candidate)
     validation = problem.validated(fit)
@@ -74,7 +74,8 @@ def _settled_row(problem: Problem, row: Ranked, leads: bool) -> Ranked:
     if plain > MOST_PLAIN and plain > row.plain_validation:
         return row
     size = sizes(fit, tuple(row.size))
-    return replace(row, fit=fit, validation=validation, plain_validation=plain, size=size)
+    now = replace(row, fit=fit, validation=validation, plain_validation=plain, size=size)
+    return row if row.accepted and size_reasons(problem.base, now) else now
 
 
 def _steady(before: Mapping[str, Size], now: Mapping[str, Size]) -> bool:

@@ -9,7 +9,8 @@ quiet second in which a leak shows.  So the scale is
 with the activity the standard deviation of the output within the window, quiet and rho the typical
 errors of the model where the output rests (at least the noise) and as a share of the activity where
 it moves, and tau the correlation time of those errors in samples: 10 000 correlated samples are
-worth a few hundred, and counted in full they would push every parameter out of its prior.  Windows
+worth a few hundred, and counted in full they would push every parameter out of its prior.  It is
+told by (sum e)^2 / sum e^2 of a window, which is tau times the square of a normal number.  Windows
 far worse than that (a break-away at the wrong instant) count no more than one three times worse.
 """
 
@@ -20,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 ACTIVE = 5.0  # noise deviations of an output that moves within a window
+MEDIAN_OF_SQUARE = 0.4549  # of a standard normal: so much of tau the ratio below has as its median
 OUTLYING = 3.0  # windows worse than this many typical errors count no more than one that is
 
 
@@ -50,7 +52,7 @@ def error_model(
     recorded = np.maximum((weight > 0).sum(axis=2), 1)
     squares = (error**2).sum(axis=2)
     size = np.sqrt(squares / recorded)
-    correlated = error.sum(axis=2) ** 2 / np.maximum(squares, 1e-300)
+    correlated = error.sum(axis=2) ** 2 / np.maximum(squares, 1e-300) / MEDIAN_OF_SQUARE
     correlated = np.clip(correlated, 1.0, error.shape[2])
     seen, moving = (weight > 0).any(axis=2), activity > ACTIVE * noise
     rests, moves = seen & ~moving, seen & moving

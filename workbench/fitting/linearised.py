@@ -226,18 +226,22 @@ class Normal:
 
 
 def normal_equations(
-    at: Linearised, unknowns: Unknowns, counted: np.ndarray | None = None
+    at: Linearised, unknowns: Unknowns, counted: np.ndarray | None = None, each: float = 1.0
 ) -> Normal:
-    """The quadratic model at a point, of all windows or of those ``counted``; see the class."""
+    """The quadratic model at a point, of all windows or of those ``counted``; see the class.
+
+    Where ``each`` stands for so many windows the priors count as much less beside it.
+    """
+    precision = unknowns.precision / each
     r, J = at.projected(at.residual[:, :, None])[:, :, 0], at.projected(at.parameters)
     if counted is not None:
         r, J = r * counted[:, None], J * counted[:, None, None]
     flat = J.reshape(J.shape[0] * J.shape[1], J.shape[2])
-    gradient = flat.T @ r.ravel() + unknowns.precision * at.point.t
+    gradient = flat.T @ r.ravel() + precision * at.point.t
     free = ~unknowns.pinned(at.point.t, gradient)
     flat = flat * free
-    hessian = flat.T @ flat + np.diag(np.where(free, unknowns.precision, 1.0))
-    return Normal(hessian, gradient * free, r, flat.reshape(J.shape), unknowns.precision * free)
+    hessian = flat.T @ flat + np.diag(np.where(free, precision, 1.0))
+    return Normal(hessian, gradient * free, r, flat.reshape(J.shape), precision * free)
 
 
 def stopping(normal: Normal, unknowns: Unknowns, t: np.ndarray) -> np.ndarray | None:

@@ -81,10 +81,9 @@ class Problem:
 
     @property
     def at_priors(self) -> np.ndarray:
-        """The scaled unknowns of the base at their priors; what the rig added keeps its size."""
-        own = {candidate.strength for candidate in self.added}
-        mine = [name in own for name in self.base.unknowns.names]
-        return np.where(mine, self.base.point.t, 0.0)
+        """The scaled unknowns of the base at their priors; what was added has none, and stays."""
+        base = self.base
+        return np.where(base.unknowns.with_prior, 0.0, base.point.t)
 
     @property
     def linearised(self) -> Linearised:
