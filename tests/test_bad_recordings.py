@@ -180,7 +180,6 @@ def test_a_column_read_by_name_and_by_number_feeds_one_signal(tmp_path):
     [
         (1.0, "ms", r"400 samples 1e-06 s apart, 0\.000399 s long, look like times in s; expected"),
         (1e4, "s", r"10 s apart, 3990 s long, look like times in ms; expected "),
-        (1e6, "s", "look like times in us; expected"),
         (1e7, "ms", "look like times in us; expected"),
     ],
 )
@@ -204,7 +203,7 @@ def test_sample_numbers_read_as_seconds_are_warned_of(tmp_path):
 
 @pytest.mark.parametrize(
     ("factor", "unit"),
-    [(1.0, "s"), (1e3, "ms"), (100.0, "s"), (0.1, "s"), (500.0, "s"), (1e3, "s"), (2e3, "s")],
+    [(1.0, "s"), (1e3, "ms"), (100.0, "s"), (0.1, "s"), (200.0, "s")],
 )
 @pytest.mark.filterwarnings("error")
 def test_an_ordinary_clock_is_not_warned_of(tmp_path, factor, unit):

@@ -14,6 +14,7 @@ from math import isfinite
 from typing import Any
 
 from workbench.errors import nearest
+from workbench.spelled_units import GAUGE, spelled
 
 STANDARD_ATMOSPHERE_PA = 101325.0
 
@@ -154,15 +155,15 @@ def display_unit(name: str) -> str:
 def scale(unit: str, name: str, ambient_pa: float = STANDARD_ATMOSPHERE_PA) -> Scale:
     """How numbers in ``unit`` become the SI value of the quantity called ``name``.
 
-    ``bar_gauge``, ``psi_gauge`` and the like count from the ambient pressure ``ambient_pa``.
+    ``bar_gauge``, ``psig`` and the like count from the ambient pressure ``ambient_pa``.
 
     Raises
     ------
     UnitError
         If the unit is unknown (the nearest one is named) or measures something else.
     """
-    unit, target = unit.strip(), si_unit(name)
-    plain = re.sub(r"_gauge$", "", unit)
+    unit, target = spelled(unit.strip()), si_unit(name)
+    plain = unit.removesuffix(GAUGE)
     if plain != unit and target != "Pa":
         raise UnitError(f"unit '{unit}' is a gauge pressure; expected {_wanted(name)}")
     found = _scale(plain, target, unit, _wanted(name))

@@ -34,18 +34,22 @@ def writable(
         Naming all of them.
     """
     from workbench.errors import InputError, Message
+    from workbench.whole_file import is_channel
 
     wrong, read, written = [], [*filter(None, reads)], [*filter(None, besides)]
     for path in filter(None, files):
         if any(_same(path, other) for other in read):
             what = "is a file that this command reads"
             wrong.append(Message(what, str(path), ANOTHER))
+        elif is_channel(path):  # takes as much as comes, beside a folder that may take nothing
+            shut = not os.access(path, os.W_OK)
+            wrong += [Message("cannot be written", str(path), ANOTHER)] if shut else []
         elif path.is_dir():
             wrong.append(Message("is a folder", str(path), "the name of a file to write"))
         elif any(_below(path, other) or _below(other, path) for other in written):
             wrong.append(Message(TAKEN, str(path), ANOTHER))
         else:
-            wrong += _no_folder(path, path.parent)
+            wrong += _no_folder(path, Path(os.path.realpath(path)).parent)
             written.append(path)
     for path in filter(None, folders):
         if any(_below(path, other) for other in written):
@@ -54,6 +58,24 @@ def writable(
             wrong += _no_folder(path, path)
     if wrong:
         raise InputError(*wrong)
+
+
+def text_to_write(path: Path) -> None:
+    """Refuse, before any work, to write a recording under the ending of a binary file.
+
+    It would be text all the same, which nothing reads back by that name.
+
+    Raises
+    ------
+    InputError
+        With a name that does.
+    """
+    from workbench.errors import InputError, Message
+    from workbench.reading.formats import BINARY
+
+    if path.suffix.lower() in BINARY:
+        what = f"recordings are written as CSV, not as {path.suffix}"
+        raise InputError(Message(what, str(path), f"{path.with_suffix('.csv')}"))
 
 
 def _same(path: Path, other: Path) -> bool:

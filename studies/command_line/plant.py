@@ -18,7 +18,7 @@ from studies.command_line.application import (
     command_text,
     example,
 )
-from studies.command_line.files import read_all, writable, write_json
+from studies.command_line.files import read_all, text_to_write, writable, write_json
 
 TABLES = "tables"  # a folder inside that of the figures
 
@@ -40,6 +40,7 @@ def simulate(
         from workbench.reading.writer import write_recording
         from workbench.rig import load_rig
 
+        text_to_write(output)
         writable(output, reads=[rig, inputs])
         found = load_rig(rig)
         recording = read_inputs(found, inputs)

@@ -59,7 +59,8 @@ class Noise:
             NoiseSource.MOVING: f"{output} is never still: its noise is from differences of "
             "neighbouring samples while it moves",
             NoiseSource.UNCLEAR: f"the noise of {output} could not be estimated: it is never "
-            "still, and its motion is in the differences; the true noise is likely smaller",
+            "still; the true noise is smaller if motion is in its differences, and larger if its "
+            "sensor is filtered; if you know it, give noise = ... for the channel in [recording]",
             NoiseSource.SHORT: f"the noise of {output} could not be estimated: it has fewer than "
             f"{FEWEST} samples; the smallest step between two of them is taken, and the true noise "
             "may be far larger",

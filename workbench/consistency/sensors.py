@@ -24,6 +24,7 @@ from workbench.effects.forces import EndStops
 from workbench.fitting.noise import THIRD_DIFFERENCE_GAIN, NoNoiseError, measured_noise
 from workbench.fitting.window_cuts import evenly
 from workbench.plant import Plant
+from workbench.reading.outliers import outliers
 from workbench.reading.plausible import RUN, saturation_text, still_stretch, stuck_stretch
 from workbench.recording import Recording
 from workbench.saturation import saturated
@@ -79,9 +80,12 @@ def _small(plant: Plant, recording: Recording, name: str) -> bool:
 def _white_share(recording: Recording, name: str) -> float:
     """Standard deviation of the white part of a channel over that of the whole.
 
-    0 where no four neighbours are recorded, as of a slow sensor on a fast clock.
+    0 where no four neighbours are recorded, as of a slow sensor on a fast clock.  Samples far off
+    all others are left out: one of them outweighs all the rest in both.
     """
-    spread = float(np.nanstd(recording[name]))
+    kept = np.where(outliers(recording[name]), np.nan, recording[name])
+    recording = replace(recording, channels={name: kept})
+    spread = float(np.nanstd(kept))
     third = np.concatenate([np.diff(piece[name], 3) for piece in recording.pieces])
     third = third[np.isfinite(third)]
     third_rms = np.sqrt(np.mean(third**2)) if len(third) else 0.0

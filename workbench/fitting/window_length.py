@@ -43,7 +43,8 @@ def window_length_s(
     the shortest: sensors wander, and a slope is told from that the better the longer it is seen.
     No window has fewer than 20 samples.
     """
-    least_s = FEWEST_SAMPLES * train[0].sample_time_s
+    sample_s = train[0].sample_time_s
+    least_s = FEWEST_SAMPLES * sample_s
     shortest_s = min(_shortest_piece_s(each) for each in (train, validation) if each)
     if position_alone(plant):
         wanted_s = shortest_s if shortest_s <= LONGEST_PIECE_S else POSITION_WINDOW_S
@@ -51,7 +52,9 @@ def window_length_s(
         wanted_s = WINDOW_S
     else:
         wanted_s = _of_gas_s(plant, train, shortest_s)
-        wanted_s = shortest_s / np.ceil(shortest_s / max(wanted_s, least_s))
+        windows = int(np.ceil(shortest_s / max(wanted_s, least_s)))
+        # Rounded up they would be one too long together, and the last one would be left out.
+        wanted_s = round(shortest_s / sample_s) // windows * sample_s
     return float(max(wanted_s, least_s))
 
 

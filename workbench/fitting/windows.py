@@ -285,11 +285,12 @@ def cut_windows(
 
 def one_clock(recordings: Iterable[Recording]) -> None:
     """Refuse recordings of different sample times: windows share one simulation."""
-    first, *others = recordings
+    first, *others = recordings = tuple(recordings)
+    slowest_s = max(each.sample_time_s for each in recordings)  # a finer one would be made up
     for other in others:
         if abs(other.sample_time_s - first.sample_time_s) > SAME_CLOCK * first.sample_time_s:
             raise ValueError(
                 f"{other.name} has a sample every {1e3 * other.sample_time_s:g} ms and "
                 f"{first.name} every {1e3 * first.sample_time_s:g} ms; expected the same: set "
-                f'resample = "{1e3 * first.sample_time_s:g} ms" in [recording]'
+                f'resample = "{1e3 * slowest_s:g} ms" in [recording]'
             )

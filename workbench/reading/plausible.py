@@ -14,6 +14,7 @@ from workbench.reading.table import RecordingWarning
 from workbench.recording import Recording
 from workbench.rig import AMBIENT, Rig
 from workbench.saturation import LIVELY, saturated
+from workbench.spelled_units import is_gauge, spelled
 from workbench.units import display_unit, public_name, scale, si_unit, suffix
 
 LIMITS = {
@@ -55,7 +56,7 @@ def cannot_be(
             return _no_level(kind, raw, si, signal.levels, file)
         if signal.name == name and np.isfinite(signal.upper):
             most = BEYOND * max(abs(signal.upper), abs(signal.lower))
-    if unit.endswith("_gauge"):
+    if is_gauge(unit):
         low = VACUUM_PA  # below ambient is no wonder
         least, size = LEAST_GAUGE_PA, float(np.nanmax(np.abs(raw))) * scale(unit, name).factor
     if not least <= size <= most:
@@ -69,7 +70,7 @@ def cannot_be(
         return Message(seen + hint, kind, f"another unit than '{unit}'", file=file)
     if si_unit(name) == "Pa" and low < VACUUM_PA:
         what = f"an absolute pressure of {low / 1e5:.3g} bar cannot be"
-        return Message(what, kind, f"'{unit}_gauge' if it counts from ambient", file=file)
+        return Message(what, kind, f"'{spelled(unit)}_gauge' if it counts from ambient", file=file)
     return None
 
 
@@ -90,7 +91,7 @@ def _ten_times(name: str, si: np.ndarray, unit: str, plant: Plant) -> str:
     """Whether a pressure is ``too large`` or ``too small`` by ten for this supply and ambient."""
     if si_unit(name) != "Pa" or not {SUPPLY, AMBIENT} <= plant.values.keys():
         return ""
-    base_pa = plant.values[AMBIENT] if unit.endswith("_gauge") else 0.0  # where a sensor reads 0
+    base_pa = plant.values[AMBIENT] if is_gauge(unit) else 0.0  # where a sensor reads 0
     lowest_pa = (1.0 - ROOM) * plant.values[AMBIENT]
     highest_pa = (1.0 + ROOM) * plant.values[SUPPLY]
     for factor, words in ((0.1, "too large"), (10.0, "too small")):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -13,15 +12,17 @@ from workbench.errors import InputError, Message, listed
 from workbench.plant import Plant
 from workbench.reading.formats import table_of
 from workbench.reading.grid import Grid, missing_stretch, uniform_grid
-from workbench.reading.plausible import cannot_be, warn_of_sensors
+from workbench.reading.outliers import impossible, warn_of_outliers, without_infinite
+from workbench.reading.plausible import warn_of_sensors
 from workbench.reading.table import RecordingWarning, Table
-from workbench.reading.time_unit import warn_of_time_unit
+from workbench.reading.time_unit import check_time_unit
 from workbench.recording import Recording
 from workbench.recording_format import derived_channels
 from workbench.rig import Rig
+from workbench.spelled_units import GAUGE, is_gauge, spelled
 from workbench.units import UnitError, public_name, scale
 
-GAUGE = "_gauge"
+NO_UNIT = {"", "-", "--", "1"}  # what a row of units says where there is none
 
 
 def read_recording(rig: Rig, path: Path | str) -> Recording:
@@ -45,6 +46,8 @@ def read_recording(rig: Rig, path: Path | str) -> Recording:
     values = {name: raw[number] for name, number in columns.items() if name != "time"}
     channels = _in_si(rig, table, values)
     derived = {k: v for k, v in derived_channels(rig.plant).items() if k not in channels}
+    if "time" in columns:  # before a grid of far too many points
+        check_time_unit(raw[columns["time"]], rig.reader.time.unit, rig.plant, table.file)
     grid = uniform_grid(
         time_s,
         table.place,
@@ -53,12 +56,10 @@ def read_recording(rig: Rig, path: Path | str) -> Recording:
         resample_s=rig.reader.resample_s,
         least=WINDOW if derived else 2,
     )
-    if "time" in columns:
-        warn_of_time_unit(raw[columns["time"]], rig.reader.time.unit, table.file)
-    channels = {name: grid.on(values) for name, values in channels.items()}
+    outputs = set(rig.plant.measured + rig.plant.optional_outputs)
+    channels = {name: grid.on(each, filled=name not in outputs) for name, each in channels.items()}
     for velocity, position in derived.items():
         channels[velocity] = derivative(channels[position], grid.sample_time_s, grid.starts)
-    outputs = set(rig.plant.measured + rig.plant.optional_outputs)
     warn_of_sensors(channels, outputs, table.file)
     unmapped = tuple(name for k, name in enumerate(table.names) if k not in numbers)
     return _recording(rig, path, channels, grid, unmapped)
@@ -130,25 +131,36 @@ def _shared(table: Table, columns: dict[str, int]) -> list[Message]:
 
 
 def _require_units(rig: Rig, table: Table, columns: dict[str, int]) -> None:
-    """Refuse a unit of the file that is another one than the rig says; what is none says nothing.
-
-    A logger writes bar for a gauge too: only one that says gauge contradicts an absolute pressure.
-    """
+    """Refuse a unit of the file that is another one than the rig says; warn of what is none."""
     wrong = []
     for name, number in columns.items():
-        told = table.units[number] if number < len(table.units) else ""
+        told = table.units[number].strip() if number < len(table.units) else ""
         unit = rig.reader.time.unit if name == "time" else rig.reader.channels[name].unit
         quantity = "time_s" if name == "time" else name
-        with suppress(UnitError):
-            own = unit if told.endswith(GAUGE) else unit.removesuffix(GAUGE)
-            if told and scale(told, quantity) != scale(own, quantity):
-                what = f"the file says {told}, the rig {unit or 'none'}"
-                expected = (
-                    f"unit = '{told}' in the rig's [recording], or {unit or 'none'} in the file"
-                )
-                wrong.append(Message(what, public_name(name), expected, file=table.file))
+        if told in NO_UNIT:
+            continue
+        try:
+            same = scale(told, quantity) == scale(_as_told(unit, told), quantity)
+        except UnitError as error:
+            expected = f"read as {unit or 'a plain number'}, as the rig says"
+            text = f"{table.file}: {public_name(name)}: the file's {error}; {expected}"
+            warnings.warn(text, RecordingWarning, stacklevel=3)
+            continue
+        if not same:
+            what = f"the file says {told}, the rig {unit or 'none'}"
+            expected = f"unit = '{told}' in the rig's [recording], or {unit or 'none'} in the file"
+            wrong.append(Message(what, public_name(name), expected, file=table.file))
     if wrong:
         raise InputError(*wrong)
+
+
+def _as_told(unit: str, told: str) -> str:
+    """The rig's unit beside one of the file: a logger that writes bar may mean a gauge too.
+
+    One that says gauge or absolute means just that.
+    """
+    explicit = is_gauge(told) or spelled(told) != told
+    return unit if explicit else spelled(unit).removesuffix(GAUGE)
 
 
 def _time(
@@ -164,16 +176,18 @@ def _in_si(rig: Rig, table: Table, raw: dict[str, np.ndarray]) -> dict[str, np.n
     """Channels in SI, still on the file's own times; refuses what cannot be."""
     plant, found, wrong = rig.plant, {}, []
     for name, values in raw.items():
-        unit = rig.reader.channels[name].unit
+        unit, values = rig.reader.channels[name].unit, without_infinite(name, values, table)
         found[name] = scale(unit, name, rig.ambient_pa).to_si(values)
         said = _missing(plant, table, found, name)
         if said is None and np.isfinite(values).any():
-            said = cannot_be(name, values, found[name], unit, plant, table.file)
+            said = impossible(name, values, found[name], unit, plant, table)
         if said is None and name in plant.measured and np.nanmin(values) == np.nanmax(values):
             seen = values[np.isfinite(values)]
             times = f"all {len(seen)} samples" if len(seen) > 1 else "its one sample"
             what = f"is {seen[0]:.6g} {unit} in {times}".replace("  ", " ")
             said = Message(what, public_name(name), "a sensor that moves", file=table.file)
+        if said is None and name in plant.measured + plant.optional_outputs:
+            warn_of_outliers(name, values, unit, table)
         wrong += [said] if said else []
     if wrong:
         raise InputError(*wrong)

@@ -26,6 +26,7 @@ DECIMAL_COMMA = re.compile(r"[-+]?0?,\d+|[-+]?\d+,(?:\d{1,2}|\d{4,})")  # never 
 QUOTED = re.compile(r'"([^"\n]*)"')
 MISSING = {"", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--"}
 LOOKED_AT = 50  # lines that decide on separator and decimal sign
+BRACKETED = re.compile(r"^[\[(](.*)[\])]$")  # all of it, not the end of ``bar(g)``
 BINARY = re.compile(r"[\x00-\x08\x0e-\x19\x1b-\x1f\x7f]")  # control characters of no text
 BINARY_SHARE = 0.05  # of them in the first lines; a text has a spoiled cell at the most
 SHOWN = 30  # characters of a cell in a message
@@ -77,7 +78,7 @@ def text_table(path: Path, reader: RecordingFormat) -> Table:
         raise InputError(Message(what, expected=expected, file=file, line=head[0]))
     n_columns = max(len(names), len(cells))
     load = partial(_load, body=body, separator=separator, file=file, numbers=numbers)
-    told = [word.strip("[]()") for word in _names(units, separator)] if units else []
+    told = [BRACKETED.sub(r"\1", word) for word in _names(units, separator)] if units else []
     return Table(file, names, n_columns, load, lambda row: f"line {numbers[row]}", told)
 
 
