@@ -19,9 +19,8 @@ from workbench.diagnosis.evidence import WARNINGS, held_out, weighed
 from workbench.diagnosis.follow import follow
 from workbench.diagnosis.judge import (
     CERTAIN_SHARE,
-    LITTLE_LEFT,
     SHARE_REASON,
-    clearly_less,
+    leaves_clearly_less,
     share_removed,
 )
 from workbench.diagnosis.law import better_base, empirical_law, standing
@@ -180,7 +179,7 @@ def _law(
     )
     if law is None:
         return None
-    if not clearly_less(*(max(1.0 - drop, LITTLE_LEFT) for drop in (law.drop_train, effect))):
+    if not leaves_clearly_less(law.drop_train, effect):
         return None
     return law if law.drop_train > shift else None
 

@@ -130,7 +130,8 @@ def _reasons_of_size(base: Fit, found: Refit | Ranked, candidate: Candidate) -> 
     if name not in found.size or found.fit is None:
         return []
     known, there = found.fit.plant.parameters[name], base.unknowns
-    size, null = found.size[name].value, known.null or 0.0
+    absent = known.null or 0.0
+    size, null = found.size[name].value, absent
     if name in there.names and there.with_prior[there.names.index(name)]:
         null = float(there.prior[there.names.index(name)])
     reasons = []
@@ -138,7 +139,7 @@ def _reasons_of_size(base: Fit, found: Refit | Ranked, candidate: Candidate) -> 
         reasons.append("its size is negligible")
     elif not distinct(found.size[name], null):
         reasons.append("its size is not distinct from none")
-    ends = (end for end in (known.lower, known.upper) if end not in (null, known.typical))
+    ends = (end for end in (known.lower, known.upper) if end not in (null, absent, known.typical))
     if any(isclose(size, end, rel_tol=AT_BOUND, abs_tol=0.0) for end in ends):
         reasons.append("its size is at a bound")
     return reasons
@@ -236,7 +237,7 @@ def _refused_by_few(other: Refit, best: Refit) -> bool:
     """
     if not other.drop_validation > LEAST_HELD_OUT:
         return False
-    more = clearly_less(*(max(1.0 - each.drop_train, LITTLE_LEFT) for each in (other, best)))
+    more = leaves_clearly_less(other.drop_train, best.drop_train)
     return more and not clearly_less(left_held_out(best), left_held_out(other))
 
 
@@ -258,6 +259,14 @@ def _leans_on(leader: Refit, other: Refit) -> bool:
 def clearly_less(left: float, than: float) -> bool:
     """True where one share of a misfit is smaller than another by a fifth at least."""
     return left < (1.0 - CLEARLY_LESS) * than
+
+
+def leaves_clearly_less(drop: float, other: float) -> bool:
+    """True where what removes one share leaves clearly less than what removes another.
+
+    What is left of a misfit is not known to a twentieth of it: below that all leave as little.
+    """
+    return clearly_less(max(1.0 - drop, LITTLE_LEFT), max(1.0 - other, LITTLE_LEFT))
 
 
 def left_held_out(each: Refit | Ranked) -> float:

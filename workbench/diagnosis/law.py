@@ -16,7 +16,7 @@ from dataclasses import replace
 from math import nan
 
 from workbench.candidate import Candidate
-from workbench.diagnosis.judge import clearly_less, reasons_against, share_removed
+from workbench.diagnosis.judge import leaves_clearly_less, reasons_against, share_removed
 from workbench.diagnosis.law_choice import worth_scanning
 from workbench.diagnosis.law_seed import refitted, seeds
 from workbench.diagnosis.refit import (
@@ -63,8 +63,7 @@ def empirical_law(
     other = _at_once(problem, terms, where)
     if law is None or other is None:
         return law or other
-    left, left_by_law = (1.0 - share_removed(each) for each in (other, law))
-    return other if clearly_less(left, left_by_law) else law
+    return other if leaves_clearly_less(share_removed(other), share_removed(law)) else law
 
 
 def better_base(problem: Problem, law: Law | None) -> Problem | None:

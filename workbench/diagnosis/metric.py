@@ -112,11 +112,18 @@ def metric_at(
 
 
 def every_second(
-    windows: Windows, unknowns: Unknowns, point: Point, at: Linearised | None = None
+    windows: Windows,
+    unknowns: Unknowns,
+    point: Point,
+    at: Linearised | None = None,
+    each: float = 1.0,
 ) -> tuple[Windows, Point, Metric, float]:
-    """Every second window where there are many: (windows, point, metric, how many each counts)."""
+    """Every second window where there are many: (windows, point, metric, how many each counts).
+
+    ``each`` is how many one of the windows counts before.
+    """
     total = len(windows)
     windows, kept = windows.part(max(total // 2, FEWEST_WINDOWS))
     point, at = replace(point, starts=point.starts[:, kept]), at.part(kept) if at else None
-    of_all = total / len(windows)
+    of_all = each * total / len(windows)
     return windows, point, metric_at(windows, unknowns, point, at, of_all), of_all

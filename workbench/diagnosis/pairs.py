@@ -20,8 +20,8 @@ from workbench.diagnosis.judge import (
     CLOSE_DROP,
     LEAST_SHARE,
     LEAST_TRAINING,
-    LITTLE_LEFT,
     clearly_less,
+    leaves_clearly_less,
     left_held_out,
     predicts,
     reasons_against,
@@ -125,7 +125,7 @@ def _reasons(problem: Problem, found: Refit, ranking: Sequence[Ranked]) -> tuple
 
 def _leaves_less(found: Refit, single: Ranked) -> bool:
     """True where a pair leaves a fifth less than a single one, in training and held out."""
-    if not clearly_less(*(max(1.0 - each.drop_train, LITTLE_LEFT) for each in (found, single))):
+    if not leaves_clearly_less(found.drop_train, single.drop_train):
         return False
     held_out = left_held_out(found), left_held_out(single)
     return isnan(found.drop_validation) or clearly_less(*held_out)

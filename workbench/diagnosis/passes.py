@@ -19,7 +19,7 @@ from workbench.candidate import Candidate
 from workbench.diagnosis.addition import Addition, assembled, refitted_addition
 from workbench.diagnosis.diagnose import Progress
 from workbench.diagnosis.evidence import weighed
-from workbench.diagnosis.judge import clearly_less, reasons_against
+from workbench.diagnosis.judge import leaves_clearly_less, reasons_against
 from workbench.diagnosis.refit import Refit, refit, refit_from, refit_shaken, refit_shift
 from workbench.diagnosis.result import Diagnosis, Evidence, Ranked
 from workbench.diagnosis.rough import rough_fit
@@ -31,7 +31,6 @@ from workbench.fitting.problem import BELIEVED, Problem, improved_base, pose
 from workbench.recording import Recording
 from workbench.rig import Rig
 
-LEAST_LEFT = 0.01  # share of a misfit: below it two shares are as good as equal
 MOST_RIVALS = 2
 
 
@@ -77,7 +76,7 @@ class Swap:
             (self.share_train, self.rival_train),
             (self.share_validation, self.rival_validation),
         )
-        return all(_leaves_less(own, rival) for own, rival in pairs)
+        return all(leaves_clearly_less(own, rival) for own, rival in pairs)
 
 
 @dataclass(frozen=True)
@@ -233,14 +232,9 @@ class Passes:
 
 def clearly_better(base: Fit, one: Refit, other: Refit) -> bool:
     """True where one passes every criterion and leaves a fifth less misfit, held out too."""
-    ahead = _leaves_less(one.drop_train, other.drop_train)
-    ahead = ahead and _leaves_less(one.drop_validation, other.drop_validation)
+    ahead = leaves_clearly_less(one.drop_train, other.drop_train)
+    ahead = ahead and leaves_clearly_less(one.drop_validation, other.drop_validation)
     return ahead and not reasons_against(base, one)
-
-
-def _leaves_less(share: float, other: float) -> bool:
-    """True where removing one share of a misfit leaves a fifth less than removing another."""
-    return clearly_less(max(1.0 - share, LEAST_LEFT), max(1.0 - other, LEAST_LEFT))
 
 
 def _put_back(problem: Problem, candidate: Candidate, final: Fit) -> Refit:

@@ -82,13 +82,6 @@ class Profile:
         """Fall of the projected cost at the best size; 0 where no size helps."""
         return max(self.trials[0].drop, 0.0)
 
-    def times(self, count: float) -> Profile:
-        """The same where each window stands for so many."""
-        trials = (
-            replace(each, drop=count * each.drop, shown=count * each.shown) for each in self.trials
-        )
-        return replace(self, trials=tuple(trials), drop_wide=count * self.drop_wide)
-
 
 def scan(
     whole: Plant,
@@ -98,6 +91,7 @@ def scan(
     candidates: Iterable[Candidate],
     at: Linearised | None = None,
     fixed: Collection[str] = (),
+    each: float = 1.0,
 ) -> list[Profile]:
     """Profiles of all candidates, the one that explains most first.
 
@@ -105,9 +99,10 @@ def scan(
     states of their own are run on a plant that has them; the others share one, so that all their
     sizes run side by side.  ``at`` are the derivatives at the point where they are known already,
     ``fixed`` are shapes that stay.  Every second window is enough to tell candidates apart where
-    there are many; drops, in weighted squares, count as of all.
+    there are many; drops, in weighted squares, count as of all, and as often as ``each`` of the
+    windows stands for others that are not there.
     """
-    windows, point, metric, of_all = every_second(windows, unknowns, point, at)
+    windows, point, metric, of_all = every_second(windows, unknowns, point, at, each)
     wide = metric_at(windows, unknowns.loosened(WIDER), point, metric.at, of_all)
     blind = blind_starts(windows.plant, metric.at)
     values = unknowns.values(point.t)
@@ -154,8 +149,8 @@ def scan_from_priors(problem: Problem) -> list[Profile]:
     windows, kept = base.windows.part(max(len(base.windows) // 4, FEWEST_FROM_PRIORS))
     point = Point(problem.at_priors, base.point.starts[:, kept])
     absent, fixed = _absent(problem), problem.rig.fixed
-    found = scan(problem.whole, windows, base.unknowns, point, absent, fixed=fixed)
-    return [profile.times(len(base.windows) / len(windows)) for profile in found]
+    each = len(base.windows) / len(windows)
+    return scan(problem.whole, windows, base.unknowns, point, absent, fixed=fixed, each=each)
 
 
 def _absent(problem: Problem) -> list[Candidate]:
