@@ -1,5 +1,7 @@
 """What few runs and few break-aways say of friction: less than many, and the deviation shows it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -117,3 +119,22 @@ def test_runs_at_one_speed_are_no_map_however_many():
 
     with pytest.raises(InputError, match=r"3 runs forward and 2 back .* 2 constant speeds or more"):
         friction(DRIVE, [run(v) for v in (0.2, 0.205, 0.21, -0.2, -0.5)])
+
+
+def test_what_the_rig_fixes_is_what_the_others_are_fitted_to():
+    """Viscous friction fixed at twice what it is: the rest comes as near as it can with that."""
+    sizes = {side: (law[1] - 0.5, law[1], law[1] + 0.5) for side, law in LAWS.items()}
+    names = {"friction.viscous_n_s_m"}
+    held = replace(
+        DRIVE,
+        plant=DRIVE.plant.with_values({"friction.viscous_n_s_m": 90.0}),
+        fixed=frozenset({*DRIVE.fixed, *names}),
+    )
+    runs = [run(side * speed) for side in LAWS for speed in (0.1, 0.3, 0.5)]
+    found = friction(held, [*runs, *(sticking(side, sizes[side]) for side in LAWS)])
+    own = found.improved().plant.values
+
+    assert not names & {each.name for each in found.parameters}
+    told = own["friction.coulomb_force_n"] + 90.0 * 0.3  # mean of both directions, mid of the runs
+    true_n = np.mean([abs(friction_n(side * 0.3)) for side in LAWS])
+    assert told == pytest.approx(true_n, rel=0.1)

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from math import floor
 
 import numpy as np
 
@@ -59,9 +60,9 @@ def residual_of(recording: Recording, error: np.ndarray, noise: float) -> Residu
 
     Of a sensor slower than the clock of its recording by its own samples.
     """
-    every = _every(error)
-    dt = every * recording.sample_time_s
-    stretches = [*_stretches(recording, error, every)]
+    step = _step(error)
+    dt = step * recording.sample_time_s
+    stretches = [*_stretches(recording, error, step)]
     frequency_hz, density = spectrum(stretches, dt)
     correlation, pairs = autocorrelation(stretches, _lags(dt, stretches))
     return Residual(
@@ -113,18 +114,21 @@ def _lags(sample_time_s: float, stretches: list[np.ndarray]) -> int:
     return min(wanted, max(map(len, stretches), default=1) - 1)
 
 
-def _every(error: np.ndarray) -> int:
-    """How many samples of the clock lie between two that are there."""
+def _step(error: np.ndarray) -> float:
+    """How many samples of the clock lie between two that are there: 1 but for a slow sensor.
+
+    One that fits the clock a whole number of times no better comes a sample early or late.
+    """
     apart = np.diff(np.flatnonzero(np.isfinite(error)))
-    return int(np.median(apart)) if len(apart) else 1
+    usual = np.median(apart) if len(apart) else 1.0
+    return float(np.mean(apart[np.abs(apart - usual) <= 1.0])) if usual > 1.0 else 1.0
 
 
-def _stretches(recording: Recording, error: np.ndarray, every: int) -> Iterator[np.ndarray]:
-    """Every so many-th error between holes and ends of pieces, from the first that is there."""
+def _stretches(recording: Recording, error: np.ndarray, step: float) -> Iterator[np.ndarray]:
+    """The errors that are there, between holes and ends of pieces."""
+    most = floor(step) + 1 if step > 1.0 else 1
     for first, piece in zip(recording.starts, recording.pieces, strict=True):
-        whole = error[first : first + len(piece)]
-        inside = whole[int(np.argmax(np.isfinite(whole))) :: every]
-        edges = np.flatnonzero(np.diff(np.isfinite(inside))) + 1
-        for part in np.split(inside, edges):
-            if len(part) and np.isfinite(part[0]):
-                yield part
+        inside = error[first : first + len(piece)]
+        there = np.flatnonzero(np.isfinite(inside))
+        edges = np.flatnonzero(np.diff(there) > most) + 1
+        yield from (part for part in np.split(inside[there], edges) if len(part))

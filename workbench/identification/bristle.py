@@ -10,7 +10,7 @@ Source: paper 002 Eqs. 20, 21 (sigma_1 in N s/m, E002-13); physics.md 5, row S00
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import inf, nan
+from math import nan
 
 import numpy as np
 
@@ -39,9 +39,9 @@ def rule(estimates: Sequence[Estimate]) -> list[Estimate]:
     """The range of the bristle's stiffness and the bound of its damping."""
     coulomb, _, damping = _bounds(estimates)
     return [
-        Estimate("least_bristle_stiffness_n_m", coulomb / DEFLECTION_M[1], inf),
-        Estimate("largest_bristle_stiffness_n_m", coulomb / DEFLECTION_M[0], inf),
-        Estimate("largest_bristle_damping_n_s_m", damping, inf),
+        Estimate("least_bristle_stiffness_n_m", coulomb / DEFLECTION_M[1], nan),
+        Estimate("largest_bristle_stiffness_n_m", coulomb / DEFLECTION_M[0], nan),
+        Estimate("largest_bristle_damping_n_s_m", damping, nan),
     ]
 
 

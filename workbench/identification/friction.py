@@ -26,7 +26,7 @@ import numpy as np
 
 from workbench.effect import Conditions
 from workbench.effects import StribeckFriction
-from workbench.errors import InputError, Message
+from workbench.errors import InputError, Message, listed
 from workbench.identification.bristle import bristle, rule
 from workbench.identification.estimate import Estimate, estimated
 from workbench.identification.least_squares import Solution, Unknown, solve
@@ -44,6 +44,7 @@ from workbench.identification.sliding import (
 from workbench.plant import Plant
 from workbench.recording import Recording
 from workbench.rig import Rig
+from workbench.units import public_name
 
 LEAST_SPEEDS = 2  # in each direction: Coulomb and viscous part
 SPEEDS_OF_FALL = 3  # in one direction: these, and the fall of the curve
@@ -104,7 +105,11 @@ def friction(rig: Rig, recordings: Sequence[Recording]) -> FrictionMap:
         else:
             breaks += starts
     _check_directions(recordings, runs, breaks)
-    free = [f"{effect.name}.{name}" for name in _free(effect, runs, breaks)]
+    shown = [f"{effect.name}.{name}" for name in _free(effect, runs, breaks)]
+    free = [name for name in shown if name not in rig.fixed]
+    if not free:
+        names = f"one of {listed(map(public_name, shown))} free"
+        raise InputError(Message("fixes all that these recordings tell", rig.name, names))
     told, found, doubts = settled(
         rig, free, lambda names: _fitted(_law(effect, _fields(names)), runs, breaks)
     )
