@@ -162,7 +162,7 @@ def _improvement(
         fit, held_out = done.last_fit
         final = fitted_rig(assembled(done.rig, done.kept.steps), fit)
     if final is not done.rig:
-        steps = (*done.steps, *(done.kept.steps if done.kept else ()))  # rivals that came in too
+        steps = (*(done.kept.steps if done.kept else ()), *(done.steps if done.law else ()))
         added = unknown_forms(done.rig, (step.candidate for step in steps))
         parameters = tuple(_counted_from(done.rig, added, row) for row in moved_parameters(fit))
     sets, windows = {"train": train, "validation": validation}, fit.windows
