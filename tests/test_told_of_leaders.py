@@ -12,7 +12,11 @@ from workbench.diagnosis.next_recording import recommended
 from workbench.diagnosis.result import Verdict
 from workbench.diagnosis.showing import NOTHING
 
-PROBLEM = SimpleNamespace(base_validation="before", validated=lambda fit: f"{fit} held out")
+PROBLEM = SimpleNamespace(
+    base=SimpleNamespace(unknowns=SimpleNamespace(names=())),
+    base_validation="before",
+    validated=lambda fit: f"{fit} held out",
+)
 
 
 def proxy(candidate, *reasons):

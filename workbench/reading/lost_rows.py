@@ -50,8 +50,8 @@ def lost_rows(
         max(np.ptp(t - slope * k) for t, k in zip(stamped, each, strict=True))
         for slope, each in zip(slopes, (found, counts), strict=True)
     )
-    # Further off than half a tick, the clock wanders, and no stamp tells which tick it is.
-    return (found, slopes[0]) if off < min(plain, slopes[0]) else None
+    # Further off than a quarter of a tick, the clock wanders: no stamp tells which tick it is.
+    return (found, slopes[0]) if off < min(plain, 0.5 * slopes[0]) else None
 
 
 def _slope(t: np.ndarray, at: np.ndarray) -> float:
