@@ -10,9 +10,8 @@ with the activity the standard deviation of the output within the window, quiet 
 errors of the model where the output rests (at least the noise) and as a share of the activity where
 it moves, and tau the correlation time of those errors in samples: 10 000 correlated samples are
 worth a few hundred, and counted in full they would push every parameter out of its prior.  It is
-told by |sum e| / sqrt(sum e^2) of a window: a normal number without its sign, times sqrt(tau).
-Windows far worse than that (a break-away at the wrong instant) count no more than one three times
-worse.
+told by (sum e)^2 / sum e^2 of a window, which is tau times the square of a normal number.  Windows
+far worse than that (a break-away at the wrong instant) count no more than one three times worse.
 """
 
 from __future__ import annotations
@@ -22,7 +21,8 @@ from dataclasses import dataclass
 import numpy as np
 
 ACTIVE = 5.0  # noise deviations of an output that moves within a window
-CHANCE = 2.0 * (1.0 - 2.0 / np.pi) ** 0.5  # two deviations of |x|, x a normal number
+MEDIAN = 0.4549  # of the square of a standard normal number
+CHANCE = 4.7  # two deviations of the median of one such number, over that median
 OUTLYING = 3.0  # windows worse than this many typical errors count no more than one that is
 
 
@@ -53,7 +53,7 @@ def error_model(
     recorded = np.maximum((weight > 0).sum(axis=2), 1)
     squares = (error**2).sum(axis=2)
     size = np.sqrt(squares / recorded)
-    sums = np.abs(error.sum(axis=2)) / np.sqrt(np.maximum(squares, 1e-300))
+    ratios = error.sum(axis=2) ** 2 / np.maximum(squares, 1e-300)
     seen, moving = (weight > 0).any(axis=2), activity > ACTIVE * noise
     rests, moves = seen & ~moving, seen & moving
     quiet = np.maximum(_median_where(rests, size), noise)
@@ -61,24 +61,20 @@ def error_model(
     return ErrorModel(
         quiet,
         _median_where(moves, beyond / np.maximum(activity, noise)),
-        _correlated(rests, sums, error.shape[2]),
-        _correlated(moves, sums, error.shape[2]),
+        _correlated(rests, ratios, error.shape[2]),
+        _correlated(moves, ratios, error.shape[2]),
     )
 
 
-def _correlated(chosen: np.ndarray, sums: np.ndarray, most: int) -> np.ndarray:
-    """Correlation times in samples, shape (n, 1).
+def _correlated(chosen: np.ndarray, ratios: np.ndarray, most: int) -> np.ndarray:
+    """Correlation times in samples, shape (n, 1): the median of the ratios tells 0.455 of them.
 
-    The mean of |sum e| is sqrt(2 tau / pi) where sum e^2 is one.  Errors are white unless they show
-    otherwise by more than chance: that mean of n windows is known to sqrt((1 - 2 / pi) / n), and
-    taken as it is it would tell too much of few white windows.
+    Errors are white unless they show otherwise by more than chance, which a median of few windows
+    has much of: taken as it is it would tell too much of white ones.
     """
-    told = []
-    for values, own in zip(sums, chosen, strict=True):
-        white = np.sqrt(2.0 / np.pi) + CHANCE / np.sqrt(max(own.sum(), 1))
-        mean = np.mean(values[own]) if own.any() else 0.0
-        told.append(np.pi / 2.0 * mean**2 if mean > white else 1.0)
-    return np.clip(np.array(told), 1.0, most)[:, None]
+    found = _median_where(chosen, ratios) / MEDIAN
+    windows = np.maximum(chosen.sum(axis=1, keepdims=True), 1)
+    return np.clip(np.where(found > 1.0 + CHANCE / np.sqrt(windows), found, 1.0), 1.0, most)
 
 
 def _median_where(chosen: np.ndarray, values: np.ndarray) -> np.ndarray:
