@@ -16,6 +16,10 @@ def separated(name, seconds=10.0):
 
 
 @pytest.mark.slow
+@pytest.mark.xfail(
+    strict=True,
+    reason="since correlation times are whole the recording asked for leaves the force beside it",
+)
 def test_the_recommended_recording_tells_a_sensor_from_a_force_on_the_independent_truth():
     """Offset and scale of one sensor stay alike: the pressure hardly changes.
 
