@@ -124,7 +124,7 @@ def test_a_shift_finds_its_way_from_the_end_at_which_it_was_held(drive_with):
 def test_what_no_cause_can_name_is_told_where_it_is_held(drive_with, believing, found):
     """A valve's flow area is no cause of the catalogue: whatever is named may stand for it."""
     name = "valve.flow_area_m2"
-    (told,) = held(drive_with(name, 7.0).base)
+    (told,) = map(str, held(drive_with(name, 7.0).base))
 
     assert told.startswith("valve.flow_area would go further than 5 deviations")
     assert held(believing.base) and held(drive_with(name, 1.0).base) == ()

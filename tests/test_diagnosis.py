@@ -8,9 +8,10 @@ import pytest
 from studies.text_of_results import addition_text
 from workbench.diagnosis.diagnose import diagnose
 from workbench.diagnosis.improve import accept, add, improve
-from workbench.diagnosis.judge import SHARE_REASON, alignment
+from workbench.diagnosis.judge import SHARE_REASON
 from workbench.diagnosis.result import DecidedBy, Verdict
 from workbench.diagnosis.scan import scan
+from workbench.diagnosis.ties import alignment
 from workbench.fitting.fit import fit
 from workbench.fitting.problem import pose
 from workbench.recording import Recording

@@ -21,7 +21,8 @@ from workbench.diagnosis.diagnose import diagnose
 from workbench.diagnosis.improve import _counted_from, improve
 from workbench.diagnosis.improvement import Change, Stage
 from workbench.diagnosis.rounds import Rounds
-from workbench.diagnosis.verdict import BEYOND, UNEXPLAINED, WITH_PRIORS, worsened
+from workbench.diagnosis.verdict import not_converged, worsened
+from workbench.diagnosis.warned import Of, Warned
 from workbench.fitting.errors import SignalError, errors_of, per_sample
 from workbench.fitting.posterior import Moved
 from workbench.rig import default_rig, load_rig
@@ -93,21 +94,20 @@ def test_what_was_said_of_an_earlier_model_stands_with_its_diagnosis_and_not_at_
     small, large = ({"train": {"rod.force": SignalError(rmse, 0.0, 1.0)}} for rmse in (1.0, 9.0))
     of_the_model = (
         *worsened(small, large),
-        f"rod.mass {BEYOND}: `workbench fit` lets them",
-        f"{WITH_PRIORS} spring_force would lead the scan",
-        "the prior fit did not converge: the ranking is provisional",
-        "the refit with spring_force did not converge: its size may be off",
+        Warned("rod.mass would go further than the rig believes", Of.MODEL),
+        not_converged("the prior fit", "the ranking is provisional"),
     )
-    left, doubt = f"{UNEXPLAINED}: rod.force 9 times its noise", "rod.force is saturated"
+    left, doubt = "rod.force 9 times its noise remains", "rod.force is saturated"
     first, *others, last = improved.diagnoses
-    warned = replace(first, warnings=(*of_the_model, left, doubt))
+    warned = (*of_the_model, Warned(left, Of.ERRORS_LEFT), Warned(doubt))
+    warned = replace(first, warned=warned)
     found = replace(improved, diagnoses=(warned, *others, last))
     lines = improvement_text(found, UNITS).splitlines()
 
     assert found.warnings == (doubt, *last.warnings)
     assert lines.count(f"warning: {doubt}") == 1 and not any(left in line for line in lines)
     begun = next(k for k, line in enumerate(lines) if line.startswith("diagnosis 1: "))
-    then = [f"  it warned then: {warning}" for warning in of_the_model]
+    then = [f"  it warned then: {warning.text}" for warning in of_the_model]
     assert lines[begun + 1 : begun + 1 + len(then)] == then
     at_the_end = replace(found, diagnoses=(first, *others, warned))
     assert at_the_end.warnings == warned.warnings

@@ -9,7 +9,7 @@ from workbench.diagnosis.ranking import _reason_not_asked
 from workbench.diagnosis.refit import surplus
 from workbench.diagnosis.rough import with_shape
 from workbench.diagnosis.scan import sizes_to_try
-from workbench.fitting.errors import plain_ratio
+from workbench.fitting.errors import plain_chance, plain_ratio
 from workbench.fitting.linearised import parameter_steps
 from workbench.fitting.unknowns import Unknowns, nominal_unknowns
 from workbench.fitting.window_length import window_length_s
@@ -38,6 +38,19 @@ def errors(size: float, windows: int = 4) -> SimpleNamespace:
 
 def test_an_output_of_which_nothing_is_recorded_has_no_say_in_the_plain_error():
     assert plain_ratio(errors(1.0), errors(2.0)) == pytest.approx(4.0)
+
+
+def test_a_plain_error_that_hangs_on_one_window_is_known_no_better_than_that_window():
+    """Of four windows one is spoilt: without it the ratio is 1, without any other it is 18/3."""
+    before, spoilt, alike = errors(1.0), errors(1.0), errors(1.1)
+    spoilt.residual[0, 2] = 4.0
+    spoilt.residual[1, 2] = 4.0
+
+    assert plain_ratio(before, spoilt) == pytest.approx(19.0 / 4.0)
+    assert plain_chance(before, spoilt) == pytest.approx(0.75 * np.log(6.0))
+    assert plain_chance(before, alike) == pytest.approx(0.0, abs=1e-12)
+    assert plain_chance(errors(1.0, windows=1), errors(2.0, windows=1)) == 0.0
+    assert np.isnan(plain_chance(before, None))
 
 
 def test_one_held_out_window_says_nothing_of_chance():

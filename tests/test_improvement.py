@@ -19,6 +19,7 @@ from workbench.diagnosis.diagnose import diagnose, silent
 from workbench.diagnosis.improve import improve
 from workbench.diagnosis.improvement import Change
 from workbench.diagnosis.passes import Kept, Passes
+from workbench.diagnosis.warned import Warned
 from workbench.fitting.errors import per_sample
 from workbench.fitting.linearised import Point
 from workbench.fitting.posterior import Moved
@@ -205,7 +206,7 @@ def test_shares_and_parameters_are_told_alike_as_text_and_as_a_document(improved
 
 def test_what_a_diagnosis_warns_of_is_told_once(improved):
     first, *others = improved.diagnoses
-    warned = [replace(each, warnings=("a doubt",)) for each in (first, first)]
+    warned = [replace(each, warned=(Warned("a doubt"),)) for each in (first, first)]
     doubtful = replace(improved, diagnoses=(*warned, *others))
 
     assert improvement_text(doubtful, UNITS).count("warning: a doubt") == 1

@@ -11,10 +11,7 @@ from workbench.comparison.regimes import regimes
 from workbench.diagnosis.diagnose import diagnose, silent
 from workbench.diagnosis.follow import follow
 from workbench.diagnosis.improve import add, improve
-from workbench.diagnosis.judge import (
-    SHARE_REASON,
-    reasons_against,
-)
+from workbench.diagnosis.judge import SHARE_REASON, reasons_against
 from workbench.diagnosis.ranking import ranked
 from workbench.diagnosis.result import DecidedBy, Size, Verdict
 from workbench.diagnosis.shifts import shifts

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from test_fitting import NOISE, sines
 
-from workbench.diagnosis.judge import imitation
 from workbench.diagnosis.metric import Metric
 from workbench.diagnosis.shifts import shifts
+from workbench.diagnosis.ties import imitation
 from workbench.fitting.linearised import Normal, normal_equations
 from workbench.fitting.problem import pose
 from workbench.plants.servo_drive import servo_drive

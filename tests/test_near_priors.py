@@ -9,8 +9,8 @@ from test_judgement import BARE, HELD_OUT, TRAIN
 
 from workbench.diagnosis.diagnose import silent
 from workbench.diagnosis.follow import follow
-from workbench.diagnosis.judge import tie_group
 from workbench.diagnosis.near_priors import hardly_moving, left_near_priors
+from workbench.diagnosis.ties import tie_group
 from workbench.fitting.gauss_newton import fit_windows
 from workbench.fitting.problem import pose
 from workbench.fitting.unknowns import nominal_unknowns

@@ -86,7 +86,7 @@ def diagnosis(verdict=Verdict.FOUND, tied=(), law=None):
         before=before,
         after=after,
         law=law,
-        warnings=(),
+        warned=(),
         base=None,
         base_validation=None,
     )

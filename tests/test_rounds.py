@@ -119,7 +119,7 @@ def waved(recording, seed, rms_n=9.0, memory_s=0.05):
     return replace(recording, channels=seen)
 
 
-@pytest.mark.parametrize(("friction_n", "force_n"), [(4.85, 2.85), (5.3, 3.3)])
+@pytest.mark.parametrize(("friction_n", "force_n"), [(4.6, 2.6), (5.3, 3.3)])
 def test_two_that_predict_hardly_better_than_neither_are_not_added(
     rig, singly, friction_n, force_n
 ):

@@ -103,7 +103,7 @@ def test_another_first_name_with_wide_priors_is_warned_of(pushed):
     better = replace(second, drop_wide=2.0 * first.drop_wide + 1.0)
     row = ranked(first.candidate, 0.5)
     tied = replace(row, tied_with=(second.candidate.name,))
-    (said,) = unsteady((row,), [first, better], Verdict.FOUND)
+    (said,) = map(str, unsteady((row,), [first, better], Verdict.FOUND))
 
     name = second.candidate.name
     assert said == f"with priors 3 times as wide {name} would lead the scan"

@@ -8,16 +8,10 @@ from test_judgement import BARE, HELD_OUT, TRAIN, named, unsure
 
 from workbench.diagnosis.diagnose import silent
 from workbench.diagnosis.follow import follow
-from workbench.diagnosis.judge import (
-    HELD_OUT_REASON,
-    SHARE_REASON,
-    alignment,
-    imitation,
-    reasons_against,
-    tie_group,
-)
+from workbench.diagnosis.judge import HELD_OUT_REASON, SHARE_REASON, reasons_against
 from workbench.diagnosis.ranking import ranked
 from workbench.diagnosis.result import Verdict
+from workbench.diagnosis.ties import alignment, imitation, tie_group
 from workbench.diagnosis.verdict import judged, sentence
 from workbench.fitting.problem import pose
 from workbench.rig import load_rig
@@ -133,6 +127,23 @@ def test_what_needs_more_than_is_usual_of_another_does_not_lead_it(
 
     assert len(group) == 2
     assert (group[0].candidate == other.candidate) is leads
+
+
+@pytest.mark.parametrize(
+    ("plain", "chance", "passes"),
+    [
+        (1.01, 0.0, True),  # rounding
+        (1.09, 0.0, False),  # every window is worse
+        (1.09, 0.23, True),  # of one break-away, on the stored truth piston_leak:2
+        (1.30, 0.50, False),  # whoever looks sees that
+    ],
+)
+def test_a_plain_error_that_grows_a_little_by_chance_among_windows_refuses_nothing(
+    problem, sound, plain, chance, passes
+):
+    found = replace(sound, plain_validation=plain, plain_chance=chance)
+
+    assert (HELD_OUT_REASON not in reasons_against(problem.base, found)) is passes
 
 
 def test_what_the_held_out_recording_refuses_leads_nothing_that_it_does_not(

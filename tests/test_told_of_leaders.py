@@ -46,6 +46,7 @@ def test_a_leader_is_told_with_the_fit_that_predicts(monkeypatch, plain, told):
     row = replace(ranked(LEAK, 0.5, accepted=True), fit="judged", plain_validation=0.9)
     monkeypatch.setattr(settle, "settled_leader", lambda fit, candidate: "settled")
     monkeypatch.setattr(settle, "plain_ratio", lambda before, after: plain)
+    monkeypatch.setattr(settle, "plain_chance", lambda before, after: 0.0)
     monkeypatch.setattr(settle, "sizes", lambda fit, names: {})
 
     (found,) = settle.with_settled_sizes(PROBLEM, (row,))
@@ -57,6 +58,7 @@ def test_a_leader_that_predicted_no_better_before_is_settled_all_the_same(monkey
     row = replace(ranked(LEAK, 0.5, accepted=True), fit="judged", plain_validation=1.5)
     monkeypatch.setattr(settle, "settled_leader", lambda fit, candidate: "settled")
     monkeypatch.setattr(settle, "plain_ratio", lambda before, after: 1.3)
+    monkeypatch.setattr(settle, "plain_chance", lambda before, after: 0.0)
     monkeypatch.setattr(settle, "sizes", lambda fit, names: {})
 
     (found,) = settle.with_settled_sizes(PROBLEM, (row,))

@@ -50,8 +50,8 @@ def test_an_output_that_pays_for_another_is_told():
         }
         return {"train": told}
 
-    worse = worsened(errors(1e-3, 1000.0), errors(1e-4, 2500.0))
-    assert worse == ("what is named makes errors larger: chamber_a.pressure in train (x 2.5)",)
+    (worse,) = map(str, worsened(errors(1e-3, 1000.0), errors(1e-4, 2500.0)))
+    assert worse == "what is named makes errors larger: chamber_a.pressure in train (x 2.5)"
     assert worsened(errors(1e-3, 1000.0), errors(1e-4, 1400.0)) == ()
     assert worsened(errors(1e-3, 1000.0, noise_pa=2e3), errors(1e-4, 2500.0)) == ()
     assert worsened(errors(1e-3, 1000.0), {}) == ()
@@ -96,11 +96,11 @@ def test_a_no_beside_large_errors_names_what_the_recording_could_not_show():
     blind = [replace(ranked(LAG, 0.1), visible_from=3.0)] * (BLIND_SHOWN + 2)
     seen = replace(ranked(LEAK, 0.1), visible_from=0.2)
 
-    (told,) = unexplained(FAR, Verdict.NOTHING_MISSING, [seen, *blind])
+    (told,) = map(str, unexplained(FAR, Verdict.NOTHING_MISSING, [seen, *blind]))
     assert told.startswith(f"unexplained errors remain on held-out windows: {FAR[0]}; ")
     assert "would not show valve_lag" in told and "and 2 more" in told
     assert "chamber_leak" not in told
-    (plain,) = unexplained(FAR, Verdict.NOTHING_MISSING, [seen])
+    (plain,) = map(str, unexplained(FAR, Verdict.NOTHING_MISSING, [seen]))
     assert plain.endswith(FAR[0])
     assert unexplained(FAR, Verdict.FOUND, blind) == ()
     assert unexplained((), Verdict.NOTHING_MISSING, blind) == ()

@@ -13,6 +13,7 @@ from dataclasses import replace
 from workbench.consistency.explained import left_unexplained
 from workbench.consistency.findings import Finding, Weight
 from workbench.diagnosis.result import Diagnosis, Verdict
+from workbench.diagnosis.warned import Warned
 from workbench.units import public_name
 
 MOST_UNEXPLAINED = 0.9  # error over motion, of every output, by the fit that a verdict rests on
@@ -28,7 +29,7 @@ def credible(found: Diagnosis, doubts: Sequence[Finding]) -> Diagnosis:
     missed = _missed(found)
     if missed:
         listed = ", ".join(f"{public_name(name)} {share:.2g}" for name, share in missed.items())
-        warning = (
+        warning = Warned(
             f"nothing explains the recording (error over motion: {listed}): is it of another "
             "plant, are its commands those that were played, is the rig file right?"
         )
@@ -40,7 +41,7 @@ def credible(found: Diagnosis, doubts: Sequence[Finding]) -> Diagnosis:
             sentence=sentence,
             after={},
             law=None,
-            warnings=(*found.warnings, warning),
+            warned=(*found.warned, warning),
             next_recording=None,
             contradicted=True,
         )

@@ -39,10 +39,10 @@ from workbench.diagnosis.result import (
 from workbench.diagnosis.scan import Profile
 from workbench.diagnosis.settle import with_settled_sizes
 from workbench.diagnosis.verdict import (
-    NOT_CONVERGED,
     far_above_noise,
     held,
     judged,
+    not_converged,
     sentence,
     too_short,
     too_short_text,
@@ -50,6 +50,7 @@ from workbench.diagnosis.verdict import (
     unsteady,
     worsened,
 )
+from workbench.diagnosis.warned import Warned
 from workbench.diagnosis.where import locate
 from workbench.diagnosis.where_stateless import of_residual
 from workbench.effect import Kind
@@ -93,24 +94,24 @@ def diagnose(
     """
     progress("the recordings against the rig")
     (train, validation), doubts = trusted(rig, train, validation)
-    warnings = tuple(map(str, doubts))
+    warned = tuple(Warned(str(doubt)) for doubt in doubts)
     train, validation, evidence = held_out(train, validation)
     problem = pose(rig, train, validation, most_windows, BELIEVED, progress)
     evidence = weighed(evidence, problem.base_validation)
     if not evidence.strong:
-        warnings += (WARNINGS[evidence],)
+        warned += (Warned(WARNINGS[evidence]),)
     progress("where it fails")
     where, begun = locate(problem, train), problem.base
     found = _asked_at_best(problem, where, progress)
     if not found.problem.base.converged:
-        warnings += (f"the prior fit {NOT_CONVERGED}: the ranking is provisional",)
+        warned += (not_converged("the prior fit", "the ranking is provisional"),)
     if where and found.problem.base is not begun:
         where = replace(where, by_regime=regime_shares(found.problem.base))
     where = where or of_residual(found.problem.base)
     told = _concluded(rig.name, found, where, evidence, progress)
-    told = credible(replace(told, warnings=warnings + told.warnings), doubts)
+    told = credible(replace(told, warned=warned + told.warned), doubts)
     unsure = unsteady(told.ranking, found.profiles, told.verdict)
-    return replace(told, warnings=told.warnings + unsure)
+    return replace(told, warned=told.warned + unsure)
 
 
 @dataclass(frozen=True)
@@ -199,15 +200,15 @@ def _concluded(
         progress("sizes of what is named")
         ranking = with_settled_sizes(problem, ranking)
     best = ranking[0] if verdict in NAMING else None
-    warnings = unexplained(far, verdict, ranking)
+    warned = unexplained(far, verdict, ranking)
     if best and best.fit and not best.fit.converged:
-        told = f"the refit with {best.candidate.name} {NOT_CONVERGED}: its size may be off"
-        warnings = (told, *warnings)
+        what = f"the refit with {best.candidate.name}"
+        warned = (not_converged(what, "its size may be off"), *warned)
     named = law or best
     last, unseen = (named.fit, named.validation) if named else (None, None)
     before = errors_of(problem.base, problem.base_validation)
     after = errors_of(last, unseen) if last else {}
-    warnings += (*worsened(before, after), *held(last or problem.base))
+    warned += (*worsened(before, after), *held(last or problem.base))
     return Diagnosis(
         rig_name=rig_name,
         verdict=verdict,
@@ -217,7 +218,7 @@ def _concluded(
         before=before,
         after=after,
         law=law,
-        warnings=warnings,
+        warned=warned,
         base=problem.base,
         base_validation=problem.base_validation,
         next_recording=recommended(problem, verdict, ranking, progress),

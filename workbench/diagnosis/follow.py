@@ -12,12 +12,9 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from workbench.diagnosis.judge import (
-    CLOSE_DROP_SAME,
     LEAST_PROXY,
     LEAST_TRAINING,
-    SAME_DIRECTION,
     SHARE_REASON,
-    alignment,
     predicts,
     reasons_against,
     share_removed,
@@ -35,6 +32,7 @@ from workbench.diagnosis.result import Where
 from workbench.diagnosis.rough import Rough, rough_fit
 from workbench.diagnosis.scan import Profile, scan_catalogue, scan_from_priors
 from workbench.diagnosis.shifts import Shift, shifts
+from workbench.diagnosis.ties import CLOSE_DROP_SAME, SAME_DIRECTION, alignment
 from workbench.diagnosis.where import acts_in
 from workbench.fitting.problem import Problem
 from workbench.fitting.pulled_in import gone_far

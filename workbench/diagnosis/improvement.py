@@ -9,7 +9,7 @@ from typing import NamedTuple
 from workbench.diagnosis.addition import Addition
 from workbench.diagnosis.passes import Removal, Swap
 from workbench.diagnosis.result import Diagnosis, Law
-from workbench.diagnosis.verdict import UNEXPLAINED, of_one_model
+from workbench.diagnosis.warned import Of
 from workbench.fitting.errors import Errors
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.posterior import Moved
@@ -118,7 +118,7 @@ class Improvement:
     def warnings(self) -> tuple[str, ...]:
         """What the diagnoses warn of, each once; of their models only that of the last one."""
         *earlier, last = self.diagnoses
-        kept = [w for found in earlier for w in found.warnings if not of_one_model(w)]
+        kept = [w.text for found in earlier for w in found.warned if w.of is Of.RECORDINGS]
         return tuple(dict.fromkeys((*kept, *last.warnings)))
 
     def warned_then(self, diagnosis: Diagnosis) -> tuple[str, ...]:
@@ -126,8 +126,8 @@ class Improvement:
 
         That errors are left is what the next round was for.
         """
-        gone = (w for w in diagnosis.warnings if w not in self.warnings)
-        return tuple(w for w in gone if not w.startswith(UNEXPLAINED))
+        then = (w.text for w in diagnosis.warned if w.of is Of.MODEL)
+        return tuple(text for text in then if text not in self.warnings)
 
     @property
     def tolerated(self) -> tuple[Moved, ...]:

@@ -26,9 +26,9 @@ import numpy as np
 
 from workbench.candidate import Candidate
 from workbench.diagnosis.blind_starts import blind_starts
-from workbench.diagnosis.judge import CLOSE_DROP, SAME_DIRECTION
 from workbench.diagnosis.metric import Metric, every_second
 from workbench.diagnosis.scan import Profile
+from workbench.diagnosis.ties import CLOSE_DROP, SAME_DIRECTION
 from workbench.effect import Parameter
 from workbench.effects.empirical import CONSTANT
 from workbench.fitting.problem import Problem, fuller

@@ -15,7 +15,7 @@ from itertools import combinations
 
 import numpy as np
 
-from workbench.diagnosis.judge import LARGEST_TIE, SHARE_REASON, effective_samples
+from workbench.diagnosis.judge import SHARE_REASON, effective_samples
 from workbench.diagnosis.manoeuvre_choice import (
     FIRST_WINDOWS,
     WINDOWS,
@@ -28,6 +28,7 @@ from workbench.diagnosis.manoeuvre_choice import (
 from workbench.diagnosis.result import NextRecording, Ranked, Verdict
 from workbench.diagnosis.rivals import distances
 from workbench.diagnosis.showing import NOTHING, showing
+from workbench.diagnosis.ties import LARGEST_TIE
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.problem import Problem
 from workbench.manoeuvres.library import LIBRARY

@@ -17,7 +17,6 @@ from math import inf, isnan
 
 from workbench.candidate import Candidate
 from workbench.diagnosis.judge import (
-    CLOSE_DROP,
     LEAST_SHARE,
     LEAST_TRAINING,
     clearly_less,
@@ -25,7 +24,6 @@ from workbench.diagnosis.judge import (
     left_held_out,
     predicts,
     reasons_against,
-    tie_group,
 )
 from workbench.diagnosis.pair_gains import FACTORS, pair_gains
 from workbench.diagnosis.power import needed
@@ -34,6 +32,7 @@ from workbench.diagnosis.refit import Refit, counted_from, refit, refit_from
 from workbench.diagnosis.result import Ranked
 from workbench.diagnosis.rough import Rough, rough_fit
 from workbench.diagnosis.scan import Profile
+from workbench.diagnosis.ties import CLOSE_DROP, tie_group
 from workbench.fitting.problem import Problem
 
 MOST_PAIRS = 3  # that are fitted

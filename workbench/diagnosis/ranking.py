@@ -6,19 +6,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from workbench.candidate import Candidate
-from workbench.diagnosis.judge import (
-    HELD_OUT_REASON,
-    LARGEST_TIE,
-    imitation,
-    reasons_against,
-    tie_group,
-)
+from workbench.diagnosis.judge import HELD_OUT_REASON, reasons_against
 from workbench.diagnosis.power import visible_from
 from workbench.diagnosis.refit import Refit
 from workbench.diagnosis.result import DecidedBy, Ranked
 from workbench.diagnosis.scan import Profile
 from workbench.diagnosis.score import modification_index
 from workbench.diagnosis.shifts import LEAVES_PRIOR, Shift
+from workbench.diagnosis.ties import LARGEST_TIE, imitation, tie_group
 from workbench.effect import Kind
 from workbench.fitting.problem import Problem
 from workbench.rig_laws import is_law
@@ -134,6 +129,7 @@ def refitted_row(
         accepted=not against,
         reasons=against,
         plain_validation=each.plain_validation,
+        plain_chance=each.plain_chance,
         fit=each.fit,
         validation=each.validation,
     )

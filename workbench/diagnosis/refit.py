@@ -19,7 +19,7 @@ from workbench.diagnosis.size import Size, sizes
 from workbench.fitting.continued import continued
 from workbench.fitting.costs import best_of_each, points_costs
 from workbench.fitting.error_model import OUTLYING
-from workbench.fitting.errors import plain_ratio
+from workbench.fitting.errors import plain_chance, plain_ratio
 from workbench.fitting.gauss_newton import Fit, beyond_noise, fit_windows, leap
 from workbench.fitting.linearised import Point
 from workbench.fitting.problem import Problem, fitted_twice, misfit
@@ -49,6 +49,7 @@ class Refit:
     drop_validation     the same on held-out recordings, where no window counts too much
     plain_validation    held-out squared error over that of the base, nothing capped, as the
                         geometric mean over outputs
+    plain_chance        standard deviation of its logarithm, by chance among windows
     """
 
     candidate: Candidate
@@ -58,6 +59,7 @@ class Refit:
     drop_train: float
     drop_validation: float
     plain_validation: float
+    plain_chance: float = 0.0
 
 
 def refit(problem: Problem, begun: Rough) -> Refit:
@@ -170,6 +172,7 @@ def counted_from(base: Fit, held_out: Fit | None, found: Refit) -> Refit:
         drop_train=_drop(base, found.fit),
         drop_validation=held_out_drop(held_out, found.validation),
         plain_validation=plain_ratio(held_out, found.validation),
+        plain_chance=plain_chance(held_out, found.validation),
     )
 
 

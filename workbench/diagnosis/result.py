@@ -11,6 +11,7 @@ import numpy as np
 from workbench.candidate import Candidate
 from workbench.diagnosis.missing_term import Course, Dependence, Intensities, Loop
 from workbench.diagnosis.size import Size
+from workbench.diagnosis.warned import Warned
 from workbench.effect import Kind
 from workbench.fitting.errors import SignalError
 from workbench.fitting.gauss_newton import Fit
@@ -83,12 +84,12 @@ class Ranked:
         Share of its effect on this recording that the fitted parameters can imitate.
     accepted, reasons
         Whether it passes every criterion of diagnosis.md 1.6, and why not in words.
-    drop_wide
-        Share of the misfit that the scan sees go with priors thrice as wide; NaN if not asked.
-    modification_index
-        Fall of chi2 that the smallest size of the scan promises; NaN likewise.
-    plain_validation
-        Held-out squared error over that of the prior fit, no window capped; NaN without.
+    drop_wide, modification_index
+        Share of the misfit that the scan sees go with priors thrice as wide, and the fall of chi2
+        that its smallest size promises; NaN if not asked.
+    plain_validation, plain_chance
+        Held-out squared error over that of the prior fit, no window capped, NaN without; standard
+        deviation of its logarithm by chance among windows.
     visible_from
         Size in typical sizes from which this recording would show it; NaN where that is not known.
     crowd
@@ -108,6 +109,7 @@ class Ranked:
     accepted: bool
     reasons: tuple[str, ...]
     plain_validation: float = float("nan")
+    plain_chance: float = 0.0
     visible_from: float = float("nan")
     crowd: tuple[str, ...] = ()
     imitated_by: Mapping[str, float] = field(default_factory=dict)
@@ -229,10 +231,8 @@ class NextRecording:
         manoeuvre goes further than those and more is missing there, errors grow and less is gained.
     alike
         Pairs of rivals that it does not tell apart either.
-    predicted
-        What each rival would record, by its name; the first one's commands are to be played.
-    commands
-        Their names.
+    predicted, commands
+        What each rival would record, by its name; the commands of the first are to be played.
     reference
         What a position loop is to follow, by output, (n,) in SI; empty where commands are played as
         they are.
@@ -275,7 +275,7 @@ class Diagnosis:
     before: Mapping[str, Mapping[str, SignalError]]
     after: Mapping[str, Mapping[str, SignalError]]
     law: Law | None
-    warnings: tuple[str, ...]
+    warned: tuple[Warned, ...]
     base: Fit = field(repr=False)
     base_validation: Fit | None = field(repr=False)
     next_recording: NextRecording | None = None
@@ -283,6 +283,11 @@ class Diagnosis:
     contradicted: bool = False
     too_short: bool = False
     strained: tuple[Moved, ...] = ()
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What it warns of, in words."""
+        return tuple(each.text for each in self.warned)
 
     @property
     def named(self) -> Ranked | None:

@@ -17,11 +17,11 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from workbench.candidate import Candidate
-from workbench.diagnosis.judge import MOST_PLAIN, size_reasons
+from workbench.diagnosis.judge import grows_plainly, size_reasons
 from workbench.diagnosis.refit import ITERATIONS
 from workbench.diagnosis.result import Ranked
 from workbench.diagnosis.size import Size, sizes
-from workbench.fitting.errors import plain_ratio
+from workbench.fitting.errors import plain_chance, plain_ratio
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.own_errors import weighed_anew
 from workbench.fitting.problem import Problem
@@ -70,11 +70,16 @@ def _settled_row(problem: Problem, row: Ranked, leads: bool) -> Ranked:
     """
     fit = (settled_leader if leads else settled)(row.fit, row.candidate)
     validation = problem.validated(fit)
-    plain = plain_ratio(problem.base_validation, validation)
-    if plain > MOST_PLAIN and plain > row.plain_validation:
+    now = replace(
+        row,
+        fit=fit,
+        validation=validation,
+        plain_validation=plain_ratio(problem.base_validation, validation),
+        plain_chance=plain_chance(problem.base_validation, validation),
+        size=sizes(fit, tuple(row.size)),
+    )
+    if grows_plainly(now) and now.plain_validation > row.plain_validation:
         return row
-    size = sizes(fit, tuple(row.size))
-    now = replace(row, fit=fit, validation=validation, plain_validation=plain, size=size)
     return row if row.accepted and size_reasons(problem.base, now) else now
 
 

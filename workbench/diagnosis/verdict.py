@@ -8,6 +8,7 @@ from workbench.diagnosis.judge import LEAST_PROXY, SHARE_REASON, share_removed
 from workbench.diagnosis.power import too_weak
 from workbench.diagnosis.result import NAMING, Evidence, Law, Ranked, Verdict, told
 from workbench.diagnosis.scan import WIDER, Profile
+from workbench.diagnosis.warned import Of, Warned
 from workbench.fitting.errors import Errors, errors_of
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.posterior import held_back
@@ -17,12 +18,7 @@ from workbench.units import public_name
 
 FAR_ABOVE_NOISE = 3.0  # RMSE over noise that is worth a word where nothing is named
 WORSE = 1.5  # RMSE of an output with what is named over that without it, and over its noise
-UNEXPLAINED = "unexplained errors remain on held-out windows"
-LARGER = "what is named makes errors larger"
 BEYOND = f"would go further than {BELIEVED:g} deviations from what the rig believes"
-WITH_PRIORS = f"with priors {WIDER:g} times as wide"
-NOT_CONVERGED = "did not converge"
-OF_ONE_MODEL = (UNEXPLAINED, LARGER, BEYOND, WITH_PRIORS, NOT_CONVERGED)
 FEWEST_WINDOWS = 2  # fitted, of a plant that moves: some effect makes up for any one stroke
 BLIND_SHOWN = 4  # names of what a recording cannot show
 HELD_SHOWN = 3  # names of what is held
@@ -82,7 +78,7 @@ def far_above_noise(held_out: Fit | None) -> list[str]:
 
 def unsteady(
     ranking: tuple[Ranked, ...], profiles: Sequence[Profile], verdict: Verdict
-) -> tuple[str, ...]:
+) -> tuple[Warned, ...]:
     """A warning where the width of the priors decides which effect the scan puts first.
 
     What the leader is tied with already is no news.  A parameter that leads would only lead more.
@@ -96,23 +92,26 @@ def unsteady(
     known = (leader.candidate.name, *leader.alike)
     if first == profiles[0].candidate or first.name in known:
         return ()
-    return (f"{WITH_PRIORS} {first.name} would lead the scan",)
+    told = f"with priors {WIDER:g} times as wide {first.name} would lead the scan"
+    return (Warned(told, Of.MODEL),)
 
 
-def unexplained(far: Sequence[str], verdict: Verdict, ranking: Sequence[Ranked]) -> tuple[str, ...]:
+def unexplained(
+    far: Sequence[str], verdict: Verdict, ranking: Sequence[Ranked]
+) -> tuple[Warned, ...]:
     """A warning where nothing is named and the error stays far above the noise all the same.
 
     What the recording could not show is told then: it is not to be taken for absent.
     """
     if not far or verdict in NAMING or verdict is Verdict.NOT_IN_CATALOGUE:
         return ()
-    told = f"{UNEXPLAINED}: {', '.join(far)}"
-    if verdict is Verdict.RECORDING_TOO_WEAK or not any(row.blind for row in ranking):
-        return (told,)
-    return (f"{told}; {_blind(ranking)}",)
+    told = f"unexplained errors remain on held-out windows: {', '.join(far)}"
+    if verdict is not Verdict.RECORDING_TOO_WEAK and any(row.blind for row in ranking):
+        told = f"{told}; {_blind(ranking)}"
+    return (Warned(told, Of.ERRORS_LEFT),)
 
 
-def worsened(before: Errors, after: Errors) -> tuple[str, ...]:
+def worsened(before: Errors, after: Errors) -> tuple[Warned, ...]:
     """A warning where an output is clearly worse with what is named than without it.
 
     The misfit weighs outputs by what is left of them, so one may pay for another; held-out errors
@@ -124,10 +123,17 @@ def worsened(before: Errors, after: Errors) -> tuple[str, ...]:
         for name, error in before.get(where, {}).items()
         if after[where][name].rmse > WORSE * max(error.rmse, error.noise)
     ]
-    return (f"{LARGER}: {', '.join(told)}",) if told else ()
+    if not told:
+        return ()
+    return (Warned(f"what is named makes errors larger: {', '.join(told)}", Of.MODEL),)
 
 
-def held(last: Fit) -> tuple[str, ...]:
+def not_converged(what: str, so: str) -> Warned:
+    """A warning of a fit that did not converge, with what follows from that."""
+    return Warned(f"{what} did not converge: {so}", Of.MODEL)
+
+
+def held(last: Fit) -> tuple[Warned, ...]:
     """A warning where the last model would go beyond what the rig believes of its parameters.
 
     What is named then may stand for what these are not allowed.
@@ -136,15 +142,8 @@ def held(last: Fit) -> tuple[str, ...]:
     if not names:
         return ()
     more = f" and {len(names) - HELD_SHOWN} more" if len(names) > HELD_SHOWN else ""
-    return (f"{', '.join(names[:HELD_SHOWN])}{more} {BEYOND}: `workbench fit` lets them",)
-
-
-def of_one_model(warning: str) -> bool:
-    """True for what is said of the model of one round, not of the recordings.
-
-    With another effect added it is to be asked again.
-    """
-    return any(words in warning for words in OF_ONE_MODEL)
+    told = f"{', '.join(names[:HELD_SHOWN])}{more} {BEYOND}: `workbench fit` lets them"
+    return (Warned(told, Of.MODEL),)
 
 
 def sentence(

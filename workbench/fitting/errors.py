@@ -105,13 +105,41 @@ def plain_ratio(before: Fit | None, after: Fit | None) -> float:
     What could not be simulated counts with its penalty: a plant is no better for stopping short.
     An output of which nothing is recorded has no say.
     """
-    if before is None or after is None:
+    sums = _plain_sums(before, after)
+    return float("nan") if sums is None else float(np.exp(_log_ratio(*sums.sum(axis=2))))
+
+
+def plain_chance(before: Fit | None, after: Fit | None) -> float:
+    """Standard deviation of the logarithm of :func:`plain_ratio`, NaN without.
+
+    Windows are a sample of what may be recorded: where the ratio hangs on one of them, another
+    recording may well say the opposite.  None without others to compare it to: 0.
+
+    Source: the jackknife, Efron 1982, "The Jackknife, the Bootstrap and Other Resampling Plans".
+    """
+    sums = _plain_sums(before, after)
+    if sums is None:
         return float("nan")
+    count = sums.shape[2]
+    if count < 2:
+        return 0.0
+    without = np.array([_log_ratio(*np.delete(sums, k, axis=2).sum(axis=2)) for k in range(count)])
+    return float(np.sqrt((count - 1) * np.var(without)))
+
+
+def _plain_sums(before: Fit | None, after: Fit | None) -> np.ndarray | None:
+    """Squared errors in SI before and after of each output seen and window, (2, n_y, n_windows)."""
+    if before is None or after is None:
+        return None
     seen = np.isfinite(before.windows.measured).any(axis=(1, 2))
     if not seen.any():
-        return float("nan")
-    ratios = penalised_rmse(after)[seen] / np.maximum(penalised_rmse(before)[seen], 1e-300)
-    return float(np.exp(2.0 * np.mean(np.log(np.maximum(ratios, 1e-12)))))
+        return None
+    return np.stack([(in_units(fit)[seen] ** 2).sum(axis=2) for fit in (before, after)])
+
+
+def _log_ratio(before: np.ndarray, after: np.ndarray) -> float:
+    """Mean logarithm of the ratios of the squared errors of all outputs, (n_y,) each."""
+    return float(np.mean(np.log(np.maximum(after / np.maximum(before, 1e-300), 1e-24))))
 
 
 def penalised_rmse(fit: Fit) -> np.ndarray:

@@ -16,6 +16,7 @@ from workbench.fitting.gauss_newton import Fit, beyond_noise, fit_windows
 from workbench.fitting.linearised import Linearised, Point, plant_at
 from workbench.fitting.noise import measured_noise
 from workbench.fitting.own_errors import ITERATIONS, consistent, weighed_anew
+from workbench.fitting.pulled_in import towards_priors
 from workbench.fitting.shaken import shaken
 from workbench.fitting.start_states import refit_starts
 from workbench.fitting.unknowns import Unknowns, nominal_unknowns
@@ -82,8 +83,7 @@ class Problem:
     @property
     def at_priors(self) -> np.ndarray:
         """The scaled unknowns of the base at their priors; what was added has none, and stays."""
-        base = self.base
-        return np.where(base.unknowns.with_prior, 0.0, base.point.t)
+        return towards_priors(self.base, 0.0)
 
     @property
     def linearised(self) -> Linearised:

@@ -1,0 +1,165 @@
+"""Ties: what a recording cannot tell apart, and which of these leads (diagnosis.md 1.6, 1.7)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from workbench.diagnosis.judge import (
+    LEAST_HELD_OUT,
+    LITTLE_LEFT,
+    clearly_less,
+    leaves_clearly_less,
+    left_held_out,
+    predicts,
+    reasons_against,
+    share_removed,
+)
+from workbench.diagnosis.near_priors import left_near_priors
+from workbench.diagnosis.refit import Refit, surplus
+from workbench.diagnosis.scan import Profile
+from workbench.diagnosis.size import DISTINCT
+from workbench.fitting.problem import Problem
+
+LARGEST_TIE = 3
+SAME_DIRECTION = 0.9  # cosine of two signatures that are one
+CLOSE_DROP = 0.25  # of the leader's drop: within it the order is not to be trusted
+CLOSE_DROP_SAME = 0.50  # the same for signatures that are one
+FAR_WORSE = 3.0  # times the misfit that is left of a recording: beyond, that one tells them apart
+
+Left = Callable[[Problem, Refit], float]  # squared error that a rival leaves
+
+
+def tie_group(
+    problem: Problem,
+    refits: list[Refit],
+    profiles: dict[str, Profile],
+    left: Left = left_near_priors,
+) -> list[Refit]:
+    """The leader and those that cannot be told from it, the leader first.
+
+    A candidate is tied when its drop comes within a quarter of the best, or within half of it with
+    a signature in the same direction: then only the nuisances decide between the two, and on the
+    held-out recording too, unless one leaves several times as much of the misfit of either, as a
+    fifth where the other leaves only noise, or fails to predict by more than a few held-out
+    windows.  Among the tied those that pass every criterion come first, effects before parameters
+    that would lie far off what is known of them, and among these the one leads with the
+    least ``left`` of both recordings together, where nuisances may hardly bend for any: either
+    recording alone orders rivals by what its few events happen to show.  But where one leaves at
+    least a fifth less of the held-out misfit, and not in a few windows alone, that recording
+    decides.  And where the leader needs more than is usual of one that is always there and leaves
+    hardly less than that one, the other leads.  Those that look most like the leader stand next to
+    it: were it wrong, it would stand for one of them.
+
+    Source: diagnosis.md 1.6; Vuong 1989, "Likelihood ratio tests for model selection and non-nested
+    hypotheses", for what chance explains.
+    """
+    tied = _close(refits, profiles)
+    against = {id(each): bool(reasons_against(problem.base, each)) for each in tied}
+    tied.sort(key=lambda each: against[id(each)])
+    sound = [each for each in tied if not against[id(each)]] or tied[:LARGEST_TIE]
+    tied = tied[: max(len(sound), LARGEST_TIE)]
+    effects = [each for each in sound if each.candidate.name in profiles] or sound
+    leader = _leader(problem, effects, left)
+    others = [each for each in tied if each is not leader]
+    others.sort(key=lambda r: (r not in sound, -abs(_alignment_of(leader, r, profiles))))
+    return [leader, *others]
+
+
+def _close(refits: Sequence[Refit], profiles: Mapping[str, Profile]) -> list[Refit]:
+    """The first, the best in training of what is sound, and those that cannot be told from it."""
+    best, *others = refits
+    tied = [best]
+    for other in others:
+        gap = (best.drop_train - other.drop_train) / max(best.drop_train, 1e-12)
+        same = abs(_alignment_of(best, other, profiles)) > SAME_DIRECTION
+        told_apart = predicts(best) and not predicts(other)
+        if told_apart and not (same or _refused_by_few(other, best)):
+            continue
+        if _far_worse(other, best):
+            continue
+        if gap < (CLOSE_DROP_SAME if same else CLOSE_DROP):
+            tied.append(other)
+    return tied
+
+
+def _far_worse(other: Refit, best: Refit) -> bool:
+    """True where one recording tells another from the best: it leaves several times as much.
+
+    The training recording does so where the held-out one does not speak for the other.
+    """
+    ours, theirs = (left_held_out(each) for each in (best, other))
+    if theirs > FAR_WORSE * max(ours, LITTLE_LEFT):
+        return True
+    most = FAR_WORSE * max(1.0 - best.drop_train, LITTLE_LEFT)
+    return 1.0 - other.drop_train > most and theirs >= ours
+
+
+def _leader(problem: Problem, effects: Sequence[Refit], left: Left) -> Refit:
+    """Which of the tied leads; see :func:`tie_group`."""
+    may_lead = [each for each in effects if predicts(each)] or effects
+    if len(may_lead) == 1:
+        return may_lead[0]
+    leader = min(may_lead, key=lambda each: left(problem, each))
+    closest = min(may_lead, key=left_held_out)
+    leader = closest if _told_apart_held_out(closest, leader) else leader
+    return next((each for each in may_lead if _leans_on(leader, each)), leader)
+
+
+def _told_apart_held_out(one: Refit, other: Refit) -> bool:
+    """True where one leaves clearly less held out, by more than chance among windows explains."""
+    if one.validation is None or other.validation is None:
+        return False
+    clearly = clearly_less(left_held_out(one), left_held_out(other))
+    return clearly and surplus(one.validation, other.validation) > DISTINCT
+
+
+def _refused_by_few(other: Refit, best: Refit) -> bool:
+    """True where single held-out windows alone refuse what explains clearly more in training.
+
+    Where no window counts too much it predicts better than without, and not clearly worse than the
+    leader: so it may well be what the leader stands for.
+    """
+    if not other.drop_validation > LEAST_HELD_OUT:
+        return False
+    more = leaves_clearly_less(other.drop_train, best.drop_train)
+    return more and not clearly_less(left_held_out(best), left_held_out(other))
+
+
+def _leans_on(leader: Refit, other: Refit) -> bool:
+    """True where a leader needs more of another than is usual, and leaves hardly less than it.
+
+    A command delay of two milliseconds is in every fit: a tube that needs more than that, and makes
+    the commands later still, is one more cause for what a longer delay explains alone.
+    """
+    name, unknowns = other.candidate.strength, leader.fit.unknowns
+    if other is leader or not other.candidate.cause.tolerated or name not in unknowns.names:
+        return False
+    usual = leader.fit.point.t[unknowns.names.index(name)] < 1.0
+    sides = ((1.0 - share_removed(each), left_held_out(each)) for each in (leader, other))
+    ours, theirs = ([max(left, LITTLE_LEFT) for left in each] for each in sides)
+    return not usual and not any(map(clearly_less, ours, theirs))
+
+
+def _alignment_of(one: Refit, other: Refit, profiles: Mapping[str, Profile]) -> float:
+    """Cosine between two refitted candidates; 0 where one has no profile (a shift)."""
+    a, b = profiles.get(one.candidate.name), profiles.get(other.candidate.name)
+    return alignment(a, b) if a and b else 0.0
+
+
+def alignment(one: Profile, other: Profile) -> float:
+    """Cosine of the angle between two projected signatures, between -1 and 1."""
+    a, b = one.signature, other.signature
+    size = float(np.linalg.norm(a) * np.linalg.norm(b))
+    return float(a @ b) / size if size > 0 else 0.0
+
+
+def imitation(truth: Profile, other: Profile) -> float:
+    """Share of the fall of the misfit by a truth that another would bring in its place.
+
+    q = C^2, with C the cosine of their signatures; nothing where they point apart.
+
+    Source: diagnosis.md 1.7.
+    """
+    return max(alignment(truth, other), 0.0) ** 2
