@@ -216,6 +216,22 @@ def test_what_a_rig_fixes_stays(limits):
     assert better.plant.values[ZONE[1]] == limits[ZONE[1]].value
 
 
+def test_a_leak_that_the_rig_fixes_is_held_while_the_limits_are_fitted(limits, sweep):
+    """Fixed twenty times too large it leaves more of the recording unexplained."""
+    left = {1.0: np.nan, 20.0: np.nan}
+    for factor in left:
+        plant = TANK.plant.with_values({ZONE[2]: factor * study.TANK.valve.leak_m2})
+        found = dead_zone(replace(TANK, plant=plant, fixed=frozenset(ZONE[2:])), [sweep])
+        assert [each.name for each in found.parameters] == list(ZONE[:2])
+        (curve,) = found.curves
+        left[factor] = np.std(curve.measured - curve.fitted)
+        if factor == 1.0:
+            assert found.lower_v == pytest.approx(study.TANK.valve.lower_v, abs=0.020)
+            assert found.upper_v == pytest.approx(study.TANK.valve.upper_v, abs=0.020)
+
+    assert left[20.0] > 2.0 * left[1.0]
+
+
 def test_a_value_beyond_its_range_is_not_taken_and_the_rig_says_so(limits):
     """It overwrote what the rig knew with the end of the range, which is no result."""
     first, *others = limits.parameters

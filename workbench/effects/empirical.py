@@ -184,8 +184,19 @@ class SpeedFlow(EmpiricalFlow):
         return self.speed_kg_m * size_of(now[self.body].velocity_m_s, ROUND_M_S)
 
 
+class _Scaled:
+    """What is counted in sizes of the recordings, by the factors of its feature."""
+
+    feature: Feature
+
+    @property
+    def counted_in(self) -> tuple[str, ...]:
+        """Forms in whose size its factors count."""
+        return counted_in(self.feature)
+
+
 @dataclass(frozen=True, kw_only=True)
-class ScaledForce(EmpiricalForce):
+class ScaledForce(_Scaled, EmpiricalForce):
     """F = a g(v / v_0, 2 (x - x_m) / L, (p_1 - p_2) / p_0), in sizes of the recordings.
 
     ``chambers`` are two whose pressures push the body, each against the other, or one and what is
@@ -213,11 +224,6 @@ class ScaledForce(EmpiricalForce):
         """As it is told, everything in its sizes."""
         return f"F = {'-' if self.direction < 0.0 else ''}a {written(self.feature)}"
 
-    @property
-    def counted_in(self) -> tuple[str, ...]:
-        """Forms in whose size its factors count."""
-        return counted_in(self.feature)
-
     def terms(self, now: Conditions) -> Iterator[Force]:
         moved, across_pa = now[self.body], 0.0
         if self.chambers:
@@ -243,7 +249,7 @@ class ScaledDrag(ScaledForce):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ScaledFlow(EmpiricalFlow):
+class ScaledFlow(_Scaled, EmpiricalFlow):
     """mdot = a g(v / v_0, (p - p_amb) / p_0, (u - u_0) / U), in sizes of the recordings.
 
     The command is what reaches the valve; ``rest`` and ``span`` are its u_0 and U in its own unit.
@@ -270,11 +276,6 @@ class ScaledFlow(EmpiricalFlow):
     def formula(self) -> str:
         """As it is told, everything in its sizes."""
         return f"mdot = a {written(self.feature)}"
-
-    @property
-    def counted_in(self) -> tuple[str, ...]:
-        """Forms in whose size its factors count."""
-        return counted_in(self.feature)
 
     def flow_kg_s(self, now: Conditions) -> Expression:
         gauge_pa = now[self.chamber].pressure_pa - now[self.outside].pressure_pa

@@ -6,7 +6,8 @@ soon as the command passes the upper limit zmd, and falls as soon as it passes t
     centre = (zms + zmd) / 2,   half-width = (zmd - zms) / 2
 
 Both are fitted to the whole recording with the rig's own plant, beside what else shapes its edges:
-the sizes of both paths, which are not kept, and the leak of the closed spool.  The slopes of
+the sizes of both paths, which are not kept, and the leak of the closed spool; what the rig fixes
+of these stays.  The slopes of
 paper 002's dead-zone block have no counterpart: full command is full opening for every width.
 
 Source: paper 002 Fig. 11, Table 3 (4.53 V, 5.37 V); physics.md 2.4 and 5, row S002-2.
@@ -58,17 +59,19 @@ def dead_zone(rig: Rig, recordings: Sequence[Recording]) -> DeadZoneLimits:
         _check_sweep(tank, each)
     noise = measured_noise(recordings, plant.measured)[plant.measured[0]]
     pieces = [piece for each in recordings for piece in each.pieces]
-    names = [f"{tank.zone}.centre_v", f"{tank.zone}.half_width_v"]
-    names += [f"{tank.valve}.{k}" for k in ("leak_area_m2", "supply_fraction", "exhaust_fraction")]
+    limits = [f"{tank.zone}.centre_v", f"{tank.zone}.half_width_v"]
+    edges = [f"{tank.valve}.{k}" for k in ("leak_area_m2", "supply_fraction", "exhaust_fraction")]
+    names = [*limits, *(name for name in edges if name not in rig.fixed)]
     found = _fitted(plant, pieces, names, noise)
     centre_v, half_v = found.values[:2]
     shares = np.array([[1.0, -1.0], [1.0, 1.0]])
     deviations = np.sqrt(np.diag(shares @ found.covariance[:2, :2] @ shares.T))
     lower_v, upper_v = float(centre_v - half_v), float(centre_v + half_v)
+    kept = 2 + names.count(edges[0])  # sizes of the paths are not: they only shape the edges
     return DeadZoneLimits(
         rig=rig,
         estimates=estimated(("lower_limit_v", "upper_limit_v"), (lower_v, upper_v), deviations),
-        parameters=estimated(names[:3], found.values[:3], found.deviations[:3]),
+        parameters=estimated(names[:kept], found.values[:kept], found.deviations[:kept]),
         curves=tuple(_curves(plant, pieces, found.residuals, noise)),
         lower_v=lower_v,
         upper_v=upper_v,
@@ -77,10 +80,9 @@ def dead_zone(rig: Rig, recordings: Sequence[Recording]) -> DeadZoneLimits:
 
 def _fitted(plant: Plant, pieces: list[Recording], names: list[str], noise: float) -> Solution:
     known, own = plant.parameters, plant.values
-    scales = (EDGE_V, EDGE_V, 0.2 * known[names[2]].typical, 0.1, 0.1)
     unknowns = [
-        Unknown(own[name], scale, known[name].lower, known[name].upper)
-        for name, scale in zip(names, scales, strict=True)
+        Unknown(own[name], _scale(name, plant), known[name].lower, known[name].upper)
+        for name in names
     ]
     runs = [outputs_under(plant, piece, names) for piece in pieces]
     starts = [guessed_states(plant, piece)[0, :, 0] for piece in pieces]
@@ -91,6 +93,13 @@ def _fitted(plant: Plant, pieces: list[Recording], names: list[str], noise: floa
         return np.concatenate([m - run(x, start)[0] for m, run, start in rows])
 
     return solve(residuals, unknowns, noise)
+
+
+def _scale(name: str, plant: Plant) -> float:
+    """A change of a parameter that shows."""
+    if name.endswith("_v"):
+        return EDGE_V
+    return 0.1 if name.endswith("_fraction") else 0.2 * plant.parameters[name].typical
 
 
 def _curves(
