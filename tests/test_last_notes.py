@@ -52,7 +52,7 @@ def test_a_note_says_what_its_effect_removes_in_the_end_where_its_round_had_anot
     told = last(with_last_notes(pair, pair.steps, (asked(friction, 0.31, 0.28), needed)))
 
     assert told[0] == (
-        f"{friction.rig.notes[-1]}; on top of all else in the end "
+        f"{friction.rig.notes[-1]}; on top of all else in the backward pass "
         "31% smaller in training, 28% in validation"
     )
     assert told[1] == force.rig.notes[-1]

@@ -5,9 +5,9 @@ from test_diagnosis import bench, coulomb, nothing
 from test_improvement import BARE, steps_of
 
 from studies.improvement_text import improvement_text
-from workbench.diagnosis import addition
 from workbench.diagnosis import improve as improvement
 from workbench.diagnosis import passes as passing
+from workbench.diagnosis import settle
 from workbench.diagnosis.diagnose import diagnose, silent
 from workbench.diagnosis.improve import improve
 from workbench.diagnosis.passes import Passes
@@ -80,7 +80,7 @@ def test_a_rival_that_takes_a_place_has_its_size_settled_like_any_addition(rig, 
         asked.append((fit, candidate.name))
         return settled_leader(fit, candidate)
 
-    monkeypatch.setattr(addition, "settled_leader", settled)
+    monkeypatch.setattr(settle, "settled_leader", settled)
     tried, better = passes.swaps(wrong, wrong.steps[0])
     ((refitted, name),) = asked
 

@@ -64,3 +64,15 @@ def test_a_leader_that_predicted_no_better_before_is_settled_all_the_same(monkey
     (found,) = settle.with_settled_sizes(PROBLEM, (row,))
 
     assert found.fit == "settled" and found.validation == "settled held out"
+
+
+def test_what_is_added_keeps_the_fit_that_predicts(monkeypatch):
+    """As the diagnosis tells it: an addition took the settled fit, whatever it did held out."""
+    row = replace(ranked(LEAK, 0.5, accepted=True), fit="judged", plain_validation=0.9)
+    monkeypatch.setattr(settle, "settled_leader", lambda fit, candidate: "settled")
+    monkeypatch.setattr(settle, "plain_chance", lambda before, after: 0.0)
+    monkeypatch.setattr(settle, "sizes", lambda fit, names: {})
+
+    for plain, kept in ((1.3, "judged"), (0.8, "settled")):
+        monkeypatch.setattr(settle, "plain_ratio", lambda before, after, plain=plain: plain)
+        assert settle.settled_refit(PROBLEM, row).fit == kept

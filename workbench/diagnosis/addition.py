@@ -18,7 +18,7 @@ from workbench.diagnosis.refit import Refit, refit, refit_shaken
 from workbench.diagnosis.result import Diagnosis, Evidence, Ranked, told
 from workbench.diagnosis.rough import rough_fit
 from workbench.diagnosis.scan import scan
-from workbench.diagnosis.settle import settled_leader
+from workbench.diagnosis.settle import settled_refit
 from workbench.fitting.errors import Errors, errors_of
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.posterior import (
@@ -113,10 +113,10 @@ def noted(step: Addition, note: str) -> Addition:
 
 def refitted_addition(rig: Rig, problem: Problem, found: Refit, evidence: Evidence) -> Addition:
     """A refit as an addition to the rig of its problem, with its size settled."""
-    fit = settled_leader(found.fit, found.candidate)
+    now = settled_refit(problem, found)
     before = errors_of(problem.base, problem.base_validation)
     drops = (found.drop_train, found.drop_validation)
-    return addition(rig, before, found.candidate, fit, problem.validated(fit), drops, evidence)
+    return addition(rig, before, found.candidate, now.fit, now.validation, drops, evidence)
 
 
 def _names_in(name: str) -> list[str]:

@@ -18,7 +18,7 @@ from workbench.diagnosis.passes import Kept, Removal, Swap
 def with_last_notes(
     kept: Kept, began: Sequence[Addition], removals: Sequence[Removal], swaps: Sequence[Swap] = ()
 ) -> Kept:
-    """What is kept, each with what it removes in the end, and with no partner that is gone.
+    """What is kept, each with what it removes when asked again, and with no partner that is gone.
 
     ``began`` is all that came in, in its rounds; ``swaps`` are rivals tried in its place.
     """
@@ -56,4 +56,4 @@ def _last_note(step: Addition, alone: bool, asked: Removal | None) -> str:
         return f"{name}: {now}" if now else f"{name}: with another, which went again, {then}"
     if now in ("", then):
         return note
-    return f"{note}; on top of all else in the end {now.removeprefix('weighted misfit ')}"
+    return f"{note}; on top of all else in the backward pass {now.removeprefix('weighted misfit ')}"

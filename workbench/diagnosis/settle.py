@@ -15,10 +15,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import TypeVar
 
 from workbench.candidate import Candidate
 from workbench.diagnosis.judge import grows_plainly, size_reasons
-from workbench.diagnosis.refit import ITERATIONS
+from workbench.diagnosis.refit import ITERATIONS, Refit
 from workbench.diagnosis.result import Ranked
 from workbench.diagnosis.size import Size, sizes
 from workbench.fitting.errors import plain_chance, plain_ratio
@@ -29,6 +30,8 @@ from workbench.fitting.resized import resized
 
 ROUNDS = 4
 STEADY = 0.02  # of a size, by which the last round may still move it
+
+Found = TypeVar("Found", Refit, Ranked)
 
 
 def with_settled_sizes(problem: Problem, ranking: tuple[Ranked, ...]) -> tuple[Ranked, ...]:
@@ -62,25 +65,38 @@ def settled_leader(fit: Fit, candidate: Candidate) -> Fit:
     return resized(settled(fit, candidate), strengths, ITERATIONS)
 
 
+def settled_refit(problem: Problem, found: Refit) -> Refit:
+    """A refit with the fit of :func:`settled_leader`, or as it was; see :func:`_with_fit`."""
+    return _with_fit(problem, found, settled_leader(found.fit, found.candidate))
+
+
 def _settled_row(problem: Problem, row: Ranked, leads: bool) -> Ranked:
     """The row with its size settled; as it was where that would no longer pass.
 
-    What was accepted for predicting better than the base, and for its size, is not to be told with
-    a fit that does not.
+    What was accepted for its size is not to be told with a fit of another.
     """
-    fit = (settled_leader if leads else settled)(row.fit, row.candidate)
+    now = _with_fit(problem, row, (settled_leader if leads else settled)(row.fit, row.candidate))
+    if now is row or not row.accepted:
+        return now
+    return row if size_reasons(problem.base, now) else now
+
+
+def _with_fit(problem: Problem, found: Found, fit: Fit) -> Found:
+    """The same found with another fit; as it was where that predicts worse than the base and it.
+
+    What was accepted for predicting better is not to be told with a fit that does not.
+    """
     validation = problem.validated(fit)
     now = replace(
-        row,
+        found,
         fit=fit,
         validation=validation,
         plain_validation=plain_ratio(problem.base_validation, validation),
         plain_chance=plain_chance(problem.base_validation, validation),
-        size=sizes(fit, tuple(row.size)),
+        size=sizes(fit, tuple(found.size)),
     )
-    if grows_plainly(now) and now.plain_validation > row.plain_validation:
-        return row
-    return row if row.accepted and size_reasons(problem.base, now) else now
+    worse = grows_plainly(now) and now.plain_validation > found.plain_validation
+    return found if worse else now
 
 
 def _steady(before: Mapping[str, Size], now: Mapping[str, Size]) -> bool:
