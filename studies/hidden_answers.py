@@ -70,7 +70,7 @@ def row_of(task: Task, said: Answer) -> Row:
     name = bench.public_name(case)
     own = next((r for r in ranking if r.candidate.name == name and r.fit is not None), None)
     weak = said.diagnosis.verdict is Verdict.RECORDING_TOO_WEAK
-    balance = _balance(said.diagnosis)
+    balances = _balances(said.diagnosis)
     told = next(iter(ranking[0].size.values()), Size(nan, nan))
     return Row(
         kind=task.kind,
@@ -86,8 +86,8 @@ def row_of(task: Task, said: Answer) -> Row:
         tied=said.tied,
         right=weak if task.kind is Kind.WEAK else said.right,
         own_drop=own.drop_train if own else nan,
-        balance=balance,
-        balance_right=balance in bench.laws.get(case.hidden or "", ()),
+        balance=" and ".join(balances),
+        balance_right=bool(balances) and {*balances} <= {*bench.laws.get(case.hidden or "", ())},
         crowd=len(ranking[0].crowd),
         beside=said.beside,
     )
@@ -109,11 +109,11 @@ def own_drop(said: Answer, rig: Rig) -> float:
     return max((refit_shaken(problem, each).drop_train for each in found), default=nan)
 
 
-def _balance(diagnosis: Diagnosis) -> str:
-    """The balance of the law that the verdict speaks of, else where the smoother finds a lack."""
+def _balances(diagnosis: Diagnosis) -> tuple[str, ...]:
+    """Those of all terms of the law that is told, else the one where the smoother finds a lack."""
     if diagnosis.law:
-        return diagnosis.law.balance
-    return diagnosis.where.balance if diagnosis.where else ""
+        return diagnosis.law.balances
+    return (diagnosis.where.balance,) if diagnosis.where else ()
 
 
 def pair_row(task: Task, said: Improvement) -> Row:

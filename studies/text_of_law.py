@@ -33,10 +33,9 @@ def law_text(law: Law) -> str:
 
 def law_document(law: Law) -> dict[str, Any]:
     """An empirical law: its terms, the sizes they are counted in, its ranges, what adds it."""
-    acting = [step.candidate for step in law.steps]
     return {
-        "balance": law.balance,
-        "balances": sorted({f"{each.place}.{each.cause.balance.value}" for each in acting}),
+        "balance": law.balances[0],
+        "balances": sorted(law.balances),
         "terms": {
             public_name(name): {
                 "value": plain(size.value),

@@ -33,3 +33,5 @@ def test_no_round_calls_found_what_rests_on_a_saturated_sensor():
     for diagnosis in found.diagnoses:
         assert any("saturated" in warning for warning in diagnosis.warnings)
         assert diagnosis.verdict is not Verdict.FOUND
+    first = found.diagnoses[0]
+    assert first.verdict is Verdict.TIE and first.next_recording.separates[0] == "coulomb_friction"

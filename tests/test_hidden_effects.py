@@ -181,7 +181,7 @@ def test_a_law_outside_the_catalogue_is_called_that():
     law = found.diagnosis.law
 
     assert found.diagnosis.verdict is Verdict.NOT_IN_CATALOGUE
-    assert law.balance == "slide.momentum"
+    assert law.balances == ("slide.momentum",)
 
 
 @pytest.mark.slow
@@ -190,7 +190,7 @@ def test_an_effect_that_keeps_little_on_what_is_held_out_bars_no_law():
     found = diagnosed("sliding_leak", ("sliding_leak",))
 
     assert found.diagnosis.verdict is Verdict.NOT_IN_CATALOGUE, said([found])
-    assert found.diagnosis.law.balance == "chamber_a.mass"
+    assert found.diagnosis.law.balances == ("chamber_a.mass",)
 
 
 @pytest.mark.slow

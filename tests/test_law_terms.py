@@ -63,7 +63,7 @@ def law_of(problem):
 def test_a_force_of_magnets_along_the_stroke_is_a_sine_of_it():
     law = law_of(posed(wavy))
 
-    assert law.balance == "rod.momentum"
+    assert law.balances == ("rod.momentum",)
     assert [*law.terms] == [f"{SINE}.size_n"]
     size = law.terms[f"{SINE}.size_n"]
     assert size.value == pytest.approx(WAVE_N, rel=0.03)

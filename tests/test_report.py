@@ -167,7 +167,7 @@ def test_an_empirical_law_comes_with_its_range():
     names = [f"{kind.causes[0].name}@slide.{kind.causes[0].strength}" for kind in FORCES]
     terms = dict.fromkeys(names, Size(-240.0, 12.0))
     ranges = {"slide.velocity_m_s": (-0.5, 0.5), "chamber_a.pressure_pa": (3e5, 6e5)}
-    law = Law("slide.momentum", terms, ranges, 0.8, 0.7, "-240 v|v|")
+    law = Law(("slide.momentum",), terms, ranges, 0.8, 0.7, "-240 v|v|")
 
     document = diagnosis_document(diagnosis(Verdict.NOT_IN_CATALOGUE, law=law), UNITS)
 

@@ -42,7 +42,6 @@ def credible(found: Diagnosis, doubts: Sequence[Finding]) -> Diagnosis:
             after={},
             law=None,
             warned=(*found.warned, warning),
-            next_recording=None,
             contradicted=True,
         )
     sure = found.verdict in (Verdict.FOUND, Verdict.NOT_IN_CATALOGUE)

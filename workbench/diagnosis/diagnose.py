@@ -79,10 +79,10 @@ def diagnose(
 ) -> Diagnosis:
     """Which effect of the catalogue is missing, judged on held-out recordings.
 
-    Without ``validation`` the last third of each recording is held out, and the verdict is at most
-    a tie, with a warning; so it is where a recording stands in both, or one is doubtful (see
-    :mod:`workbench.consistency`).  ``most_windows`` bounds the windows that are fitted: fewer are
-    faster.  What is there goes no further than what is believed of it
+    Without ``validation`` the last third of each recording is held out, and nothing is called found
+    but told as one of a tie, with a warning; so it is where a recording stands in both, or one is
+    doubtful (see :mod:`workbench.consistency`).  ``most_windows`` bounds the windows that are
+    fitted: fewer are faster.  What is there goes no further than what is believed of it
     (:data:`workbench.fitting.problem.BELIEVED`); what would go on is among the ``strained``.
 
     Raises
@@ -111,7 +111,11 @@ def diagnose(
     told = _concluded(rig.name, found, where, evidence, progress)
     told = credible(replace(told, warned=warned + told.warned), doubts)
     unsure = unsteady(told.ranking, found.profiles, told.verdict)
-    return replace(told, warned=told.warned + unsure)
+    told = replace(told, warned=told.warned + unsure)
+    if told.contradicted and not told.too_short:
+        return told
+    asked = recommended(found.problem, told.verdict, told.ranking, progress)
+    return replace(told, next_recording=asked)
 
 
 @dataclass(frozen=True)
@@ -221,7 +225,6 @@ def _concluded(
         warned=warned,
         base=problem.base,
         base_validation=problem.base_validation,
-        next_recording=recommended(problem, verdict, ranking, progress),
         evidence=evidence,
         contradicted=short,
         too_short=short,

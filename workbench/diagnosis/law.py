@@ -178,9 +178,9 @@ def _law(best: Refit, steps: list[LawTerm]) -> Law:
     )
     windows = best.fit.windows
     ranges = seen_in(windows.plant.lean(keep=_members(accepted)), windows.recordings)
-    balance = f"{accepted[0].place}.{accepted[0].cause.balance.value}"
+    balances = tuple(dict.fromkeys(f"{c.place}.{c.cause.balance.value}" for c in accepted))
     drops = (best.drop_train, best.drop_validation)
-    return Law(balance, terms, ranges, *drops, text, tuple(steps), best.fit, best.validation)
+    return Law(balances, terms, ranges, *drops, text, tuple(steps), best.fit, best.validation)
 
 
 def _spoken(name: str, size: Size) -> str:

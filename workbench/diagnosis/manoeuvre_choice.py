@@ -20,7 +20,7 @@ from math import log, sqrt
 
 import numpy as np
 
-from workbench.diagnosis.judge import LEAST_BIC
+from workbench.diagnosis.judge import LEAST_BIC, effective_samples
 from workbench.diagnosis.result import NextRecording
 from workbench.diagnosis.rivals import Rehearsed
 from workbench.fitting.gauss_newton import Fit
@@ -47,6 +47,12 @@ def least_gain(more: int = 0, samples: float = 1.0) -> float:
     """
     asked = LEAST_BIC + more * log(max(samples, 1.0))
     return (EIGHT_OF_TEN + sqrt(EIGHT_OF_TEN**2 + asked)) ** 2
+
+
+def with_one_more(fit: Fit, limits: Limits) -> float:
+    """Effective samples of the recordings of a fit, and of one more within these limits."""
+    recorded = len(fit.windows) * fit.windows.length
+    return effective_samples(fit) * (1.0 + limits.samples / recorded)
 
 
 def chosen(

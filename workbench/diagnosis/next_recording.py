@@ -15,7 +15,7 @@ from itertools import combinations
 
 import numpy as np
 
-from workbench.diagnosis.judge import SHARE_REASON, effective_samples
+from workbench.diagnosis.judge import SHARE_REASON
 from workbench.diagnosis.manoeuvre_choice import (
     FIRST_WINDOWS,
     WINDOWS,
@@ -24,6 +24,7 @@ from workbench.diagnosis.manoeuvre_choice import (
     chosen,
     inside,
     least_gain,
+    with_one_more,
 )
 from workbench.diagnosis.result import NextRecording, Ranked, Verdict
 from workbench.diagnosis.rivals import distances
@@ -32,7 +33,7 @@ from workbench.diagnosis.ties import LARGEST_TIE
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.problem import Problem
 from workbench.manoeuvres.library import LIBRARY
-from workbench.manoeuvres.limits import limits_of
+from workbench.manoeuvres.limits import Limits, limits_of
 from workbench.manoeuvres.play import Manoeuvre
 
 ASKING = (Verdict.TIE, Verdict.SMALL_PROXY, Verdict.RECORDING_TOO_WEAK)
@@ -87,7 +88,7 @@ def next_recording(rivals: Plants, library: Sequence[Manoeuvre] = LIBRARY) -> Ne
     rehearsed = inside(fits, limits, library)
     if not rehearsed:
         return None
-    least = _least(fits)
+    least = _least(fits, limits)
 
     def gain(found: np.ndarray) -> np.ndarray:
         """Smallest T of each manoeuvre over the pairs that any of them tells apart.
@@ -110,8 +111,8 @@ def next_recording(rivals: Plants, library: Sequence[Manoeuvre] = LIBRARY) -> Ne
     return asked_for(rivals, limits, best, float(exact[exact >= least].min()), alike)
 
 
-def _least(fits: Sequence[Fit]) -> np.ndarray:
+def _least(fits: Sequence[Fit], limits: Limits) -> np.ndarray:
     """The T from which on each pair counts as told apart, in the order of combinations of two."""
-    samples = effective_samples(fits[0])
+    samples = with_one_more(fits[0], limits)
     sizes = [len(fit.unknowns) for fit in fits]
     return np.array([least_gain(abs(a - b), samples) for a, b in combinations(sizes, 2)])

@@ -199,12 +199,12 @@ class LawTerm:
 class Law:
     """An empirical law for a balance that no effect of the catalogue explains.
 
-    ``terms`` are coefficients by full parameter name; ``ranges`` the range of each measured output,
-    and of the speed of bodies, in which it was seen; ``steps`` its terms one after the other;
-    ``fit`` and ``validation`` as of a refit.  It is not a physical effect.
+    ``balances`` are those of its terms; ``terms`` coefficients by full parameter name; ``ranges``
+    those of all measured outputs and speeds in which it was seen; ``steps`` its terms one after the
+    other; ``fit`` and ``validation`` as of a refit.  It is not a physical effect.
     """
 
-    balance: str
+    balances: tuple[str, ...]
     terms: Mapping[str, Size]
     ranges: Mapping[str, tuple[float, float]]
     drop_train: float

@@ -18,7 +18,7 @@ from dataclasses import replace
 import numpy as np
 
 from workbench.candidate import Candidate
-from workbench.diagnosis.judge import LEAST_SHARE, effective_samples
+from workbench.diagnosis.judge import LEAST_SHARE
 from workbench.diagnosis.manoeuvre_choice import (
     FIRST_WINDOWS,
     WINDOWS,
@@ -26,6 +26,7 @@ from workbench.diagnosis.manoeuvre_choice import (
     chosen,
     inside,
     least_gain,
+    with_one_more,
 )
 from workbench.diagnosis.result import NextRecording, Ranked
 from workbench.diagnosis.rivals import distances
@@ -99,8 +100,7 @@ def supposed(problem: Problem, candidate: Candidate) -> Fit:
 def _needed(problem: Problem, limits: Limits, candidate: Candidate) -> float:
     """The T with which a candidate would be accepted, one recording more among the others."""
     base = problem.base
-    recorded = len(base.windows) * base.windows.length
-    samples = effective_samples(base) * (1.0 + limits.samples / recorded)
+    samples = with_one_more(base, limits)
     misfit = samples * problem.misfit / max(base.cost, 1.0)  # weighted errors have unit size
     enough = least_gain(1 + len(candidate.forms), samples)
     return max(LEAST_SHARE / (1.0 - LEAST_SHARE) * misfit, enough)
