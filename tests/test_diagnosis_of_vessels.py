@@ -228,6 +228,19 @@ def test_what_is_missing_is_followed_through_all_training_recordings(leaking):
     assert both.term[~in_first].mean() < 0.5 * first.term.mean() < 0.0  # gas leaves there too
 
 
+def test_where_nothing_was_recorded_for_long_nothing_is_told_of_what_is_missing(leaking):
+    """From 20 to 40 s: two seconds, twenty samples, around what was heard are told."""
+    holed = leaking[0][PRESSURE].copy()
+    holed[200:400] = np.nan
+    recorded = replace(leaking[0], channels={PRESSURE: holed})
+    where = locate(pose(chamber_decay.rig(), [recorded]), [recorded])
+
+    assert np.diff(where.time_s).max() == pytest.approx(20.1 - 2 * 2.0, abs=0.1)
+    assert not ((where.time_s > 22.05) & (where.time_s < 37.95)).any()
+    assert len(where.term) == len(where.time_s) == len(where.term_deviation)
+    assert where.course.states.shape[1] == len(where.time_s)
+
+
 def test_the_walls_of_a_leak_and_of_cooling_are_a_tie_in_a_minute(leaking):
     found = diagnose(chamber_decay.rig(), leaking[:2], leaking[2:])
     leader = found.ranking[0]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from workbench.diagnosis.ranking import _reason_not_asked
-from workbench.diagnosis.refit import surplus
+from workbench.diagnosis.refit import bounded_error, surplus
 from workbench.diagnosis.rough import with_shape
 from workbench.diagnosis.scan import sizes_to_try
 from workbench.fitting.errors import plain_chance, plain_ratio
@@ -30,7 +30,7 @@ def errors(size: float, windows: int = 4) -> SimpleNamespace:
     cut = SimpleNamespace(
         measured=measured,
         scale=np.ones((3, windows)),
-        length=10,
+        weight=1.0 * np.isfinite(measured),
         correlation=np.ones((3, windows)),
     )
     return SimpleNamespace(windows=cut, residual=residual)
@@ -55,6 +55,20 @@ def test_a_plain_error_that_hangs_on_one_window_is_known_no_better_than_that_win
 
 def test_one_held_out_window_says_nothing_of_chance():
     assert surplus(errors(0.5, windows=1), errors(0.6, windows=1)) == 0.0
+
+
+def test_a_held_out_window_counts_no_more_than_an_outlying_one_of_its_recorded_samples():
+    """Of output 1 every other sample is missing; 9 n / tau is all that a window may count."""
+    found = errors(1.0)
+    found.windows.measured[1, :, ::2], found.residual[1, :, ::2] = np.nan, 0.0
+    found.windows.weight = 1.0 * np.isfinite(found.windows.measured)
+    found.windows.correlation[1] = 2.5
+    plain = 4 * (10 + 5)
+    found.residual[:2, 2] *= 2.9  # squared 8.41: output 0 keeps it, of output 1 it is cut
+
+    assert bounded_error(found) == pytest.approx(plain - 15 + 84.1 + 9 * 5 / 2.5)
+    found.residual[:2, 2] *= 10.0
+    assert bounded_error(found) == pytest.approx(plain - 15 + 90 + 9 * 5 / 2.5)
 
 
 def decay(seconds: float) -> Recording:

@@ -8,7 +8,7 @@ from scipy.signal import lsim
 
 from tests.linear_plant import DAMPING_N_S_M, MASS_KG, STIFFNESS_N_M, cart
 from workbench.fitting.gauss_newton import fit_windows
-from workbench.fitting.posterior import both_deviations
+from workbench.fitting.posterior import both_deviations, posterior_covariance
 from workbench.fitting.unknowns import Unknowns
 from workbench.fitting.windows import cut_windows
 from workbench.recording import Recording
@@ -65,3 +65,14 @@ def test_a_deviation_tells_how_far_fits_of_other_recordings_are_apart(plant, spr
 
     assert told == pytest.approx(apart, rel=0.4)
     assert spread == 0.0 or curvature < told / 5.0
+
+
+def test_a_deviation_is_told_by_the_errors_of_the_fit_itself(plant):
+    """Its windows may still have the scales of a plant that was ten times as far off."""
+    found = fitted(plant, 0.0, np.random.default_rng(3))
+    coarse = replace(found.windows, scale=10.0 * found.windows.scale)
+    poor = fit_windows(coarse, found.unknowns, found.point, iterations=0)
+    again, known = both_deviations(poor), both_deviations(found)
+
+    assert np.ravel(again) == pytest.approx(np.ravel(known), rel=0.05)
+    assert posterior_covariance(poor) == pytest.approx(posterior_covariance(found), rel=0.1)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from page_files import drive_files
+from scipy.signal import lfilter
 
 from studies.text import outside_band
 from workbench.comparison.independence import independence
@@ -24,6 +25,17 @@ def test_white_noise_is_independent_of_the_input_and_a_late_share_of_it_is_found
     assert found.lag_s[np.argmax(found.correlation)] == pytest.approx(7e-3)
     assert found.correlation.max() == pytest.approx(0.2 / np.sqrt(1.04), abs=0.03)
     assert found.bands.min() == pytest.approx(1.96 / np.sqrt(4000), rel=0.3)
+
+
+def test_the_band_is_wider_where_error_and_input_are_both_slow():
+    """AR(1) with 0.9 both: P = sum of 0.81^|k| = 1.81 / 0.19, its root 3.09; by chance 5 %."""
+    rng, n = np.random.default_rng(4), 10_000
+    slow = lfilter([1.0], [1.0, -0.9], rng.standard_normal((20, 2, n)))
+    found = [independence(e, u, "u", 1e-3, 100) for e, u in slow]
+
+    bands = np.array([each.bands.min() for each in found])
+    assert bands.mean() == pytest.approx(np.sqrt(1.81 / 0.19) * 1.96 / np.sqrt(n), rel=0.05)
+    assert np.mean([each.outside for each in found]) == pytest.approx(0.05, abs=0.02)
 
 
 def test_the_correlation_is_that_of_numpy():

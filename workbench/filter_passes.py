@@ -33,10 +33,10 @@ class FilterResult:
 
     Attributes
     ----------
-    states, state_deviation
-        Estimate and its standard deviation, shape (n_x, n).
+    states
+        Estimate, shape (n_x, n).
     unknown, unknown_deviation
-        Unknown inputs in the unit of the state rate, shape (n_w, n).
+        Unknown inputs in the unit of the state rate and their standard deviations, shape (n_w, n).
     innovations, normalised
         Measured minus predicted output, and the same over its predicted standard deviation,
         shape (n_y, n); NaN where nothing was received.
@@ -46,10 +46,8 @@ class FilterResult:
 
     time_s: np.ndarray
     state_names: tuple[str, ...]
-    unknown_names: tuple[str, ...]
     measured: tuple[str, ...]
     states: np.ndarray
-    state_deviation: np.ndarray
     unknown: np.ndarray
     unknown_deviation: np.ndarray
     innovations: np.ndarray
@@ -266,10 +264,8 @@ def _joined(found: PlantFilter, passes: list[_Pass]) -> FilterResult:
     return FilterResult(
         time_s=step_s * np.arange(X.shape[1]),
         state_names=found.plant.model.states,
-        unknown_names=tuple(found.unknown_inputs),
         measured=found.plant.measured,
         states=X[:n],
-        state_deviation=deviation[:n],
         unknown=X[n:],
         unknown_deviation=deviation[n:],
         innovations=innovation,

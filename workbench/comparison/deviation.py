@@ -21,6 +21,7 @@ import numpy as np
 
 from workbench.comparison.course import Course
 from workbench.comparison.gear_shift import Shift, shifts
+from workbench.fitting.holes import usual_gap
 from workbench.simulation import simulate
 
 LEAD_S = 0.02  # before a shift: valves and delays are at rest there, and their states known
@@ -36,23 +37,28 @@ class ShiftDeviation:
     deviations: Mapping[str, float]
 
 
-def deviation(measured: np.ndarray, simulated: np.ndarray, sample_time_s: float) -> float:
+def deviation(
+    measured: np.ndarray, simulated: np.ndarray, sample_time_s: float, usual: int | None = None
+) -> float:
     """Mean absolute error over the range of what was measured, by the trapezoidal rule.
 
-    ``measured`` and ``simulated`` have shape (n,).  Intervals next to a missing sample count for
-    nothing.  NaN where nothing was measured or the measured signal does not vary.
+    ``measured`` and ``simulated`` have shape (n,).  ``usual`` is how many samples the sensor takes
+    from one value to the next, by default as most are apart here.  Where values are missing, two
+    are at least twice as far apart, and what is between them counts for nothing.  NaN where nothing
+    was measured or the measured signal does not vary.
 
     Source: paper 003 Eq. 13, with the absolute value (erratum E003-5).
     """
     size = np.abs(measured - simulated)
     both = np.isfinite(size)
     span = float(np.ptp(measured[both])) if both.any() else 0.0
-    middle = (size[1:] + size[:-1]) / 2.0
-    whole = np.isfinite(middle)
+    gaps, sizes = np.diff(np.flatnonzero(both)), size[both]
+    middle = (sizes[1:] + sizes[:-1]) / 2.0
+    whole = gaps < 2 * (usual or usual_gap(both))
     if span == 0.0 or not whole.any():
         return float("nan")
-    duration_s = sample_time_s * whole.sum()
-    return float(sample_time_s * middle[whole].sum() / duration_s / span)
+    duration_s = sample_time_s * gaps[whole].sum()
+    return float(sample_time_s * (gaps * middle)[whole].sum() / duration_s / span)
 
 
 def shift_deviations(course: Course) -> tuple[ShiftDeviation, ...]:
@@ -73,8 +79,9 @@ def _deviation_of(course: Course, shift: Shift) -> ShiftDeviation:
     begin = max(shift.first - max(round(LEAD_S / dt), 1), begin)
     found = simulate(plant, recording.part(begin, shift.last + 1), course.states[:, begin])
     inside = slice(shift.first, shift.last + 1)
-    deviations = {
-        name: deviation(recording[name][inside], found[name][shift.first - begin :], dt)
-        for name in plant.measured
-    }
+    deviations = {}
+    for name in plant.measured:
+        values, usual = recording[name], usual_gap(np.isfinite(recording[name]))
+        simulated = found[name][shift.first - begin :]
+        deviations[name] = deviation(values[inside], simulated, dt, usual)
     return ShiftDeviation(shift.case, dt * shift.first, dt * shift.last, deviations)

@@ -217,7 +217,11 @@ def bounded_error(fit: Fit) -> float:
 
 
 def _bounded_squares(fit: Fit) -> np.ndarray:
-    """Squared error of each output and window up to that of an outlying one, (n_y, n_windows)."""
+    """Squared error of each output and window up to that of an outlying one, (n_y, n_windows).
+
+    One is worth its recorded samples over the correlation time of their errors.
+    """
     windows = fit.windows
     squares = (fit.residual**2).sum(axis=2)
-    return np.minimum(squares, OUTLYING**2 * windows.length / windows.correlation)
+    recorded = (windows.weight > 0).sum(axis=2)
+    return np.minimum(squares, OUTLYING**2 * recorded / windows.correlation)

@@ -7,7 +7,8 @@ and by its parameters, which the recordings so far hold with the precision L_k, 
     T_jk = min over p_k of |r|^2 = r' (1 - J_k (J_k' J_k + L_k)^-1 J_k') r
 
 with the start states projected out of r and J_k: the Hunter-Reiner distance, the chi2 by which the
-right one of the two is expected to be better.
+right one of the two is expected to be better.  Of each output it counts as many samples as its
+sensor gave in the recordings so far: a rehearsal has one at every tick of the clock.
 
 Source: diagnosis.md 1.8; Hunter and Reiner 1965, "Designs for discriminating between two rival
 models".
@@ -23,6 +24,7 @@ import numpy as np
 
 from workbench.fitting.error_model import OUTLYING
 from workbench.fitting.gauss_newton import Fit
+from workbench.fitting.holes import usual_gap
 from workbench.fitting.linearised import Linearised, Point, borrowed, linearise
 from workbench.fitting.posterior import posterior_covariance
 from workbench.fitting.start_states import refit_starts
@@ -80,7 +82,8 @@ def distances(
         at = _settled(windows, fit) if settled else _derivatives(windows, fit, near)
         near = near or (at, (windows, fit.unknowns))
         owner = np.repeat(np.arange(len(rehearsed)), [len(own) for own in windows.firsts])
-        most_chi2 = OUTLYING**2 * np.sum(windows.length / windows.correlation, axis=0)
+        recorded = (windows.weight > 0).sum(axis=2)
+        most_chi2 = OUTLYING**2 * np.sum(recorded / windows.correlation, axis=0)
         columns.append(
             [
                 distance(at.part(owner == m), precisions[k], most_chi2[owner == m], of_all)
@@ -135,7 +138,11 @@ def _windows(
     whole = np.arange(len(pairs[0][0]) // length)
     kept = whole if most is None or most >= len(whole) else evenly(len(whole), most)
     firsts = tuple(int(k) * length for k in kept)
-    measured = [cut_rows(other.rows(like.plant.measured), firsts, length) for other, _ in pairs]
+    sampled = _sampled(like, len(pairs[0][0]))
+    measured = [
+        cut_rows(np.where(sampled, other.rows(like.plant.measured), np.nan), firsts, length)
+        for other, _ in pairs
+    ]
     sources = [[a if name in a.channels else b for name in states] for a, b in pairs]
     start = [
         np.reshape([s[name][list(firsts)] for s, name in zip(each, states, strict=True)],
@@ -154,3 +161,12 @@ def _windows(
         scale=np.ones((len(like.plant.measured), count)),
     )
     return found, len(whole) / len(kept)
+
+
+def _sampled(like: Windows, count: int) -> np.ndarray:
+    """True where a sensor as slow as so far would give one of so many samples, (n_y, count)."""
+    found = np.zeros((len(like.plant.measured), count), dtype=bool)
+    for row, name in zip(found, like.plant.measured, strict=True):
+        so_far = np.concatenate([each[name] for each in like.recordings])
+        row[:: usual_gap(np.isfinite(so_far))] = True
+    return found

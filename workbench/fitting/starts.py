@@ -15,9 +15,11 @@ five is taken, and what both differ by is how well the state is known.  Coils an
 solenoid valves follow from the commands alone: they are simulated from the start of each piece, at
 the plant's own values.
 
-Short holes in a channel are bridged by straight lines.  In long ones, and next to them, nothing is
-known of any state: they keep their guess with the deviation of a state that is not measured, and
-the masses are followed anew behind them, as at the start of a piece.
+Short holes in a channel, and what lies between the samples of a slow sensor, are bridged by
+straight lines; what these may be off is how well the state and its rate are known there.  In long
+ones, and next to them, nothing is known of any state: they keep their guess with the deviation of a
+state that is not measured, and the masses are followed anew behind them, as at the start of a
+piece.
 
 Source: physics.md 1.2 level 1, solved for the mass flow.
 """
@@ -33,12 +35,12 @@ import numpy as np
 from workbench.air import HEAT_CAPACITY_RATIO
 from workbench.called import result
 from workbench.effects.solenoid_valve import SolenoidValve
+from workbench.fitting.holes import SMOOTHING_SAMPLES, bridged, bridging_errors, long_holes
 from workbench.gas_volume import GasVolume
 from workbench.plant import Plant
 from workbench.recording import Recording
 from workbench.simulation import simulate
 
-SMOOTHING_SAMPLES = 15  # of the parabola through recorded values that gives their slope
 SUDDEN_SAMPLES = 5  # the same where it changes suddenly
 SUDDEN = 6.0  # times the usual difference of both: four standard deviations of noise alone
 ROUNDED = 1e-6  # of their largest difference: what is less is rounding
@@ -73,11 +75,13 @@ def sensed_states(plant: Plant, recording: Recording, blind: np.ndarray) -> np.n
     n, starts = len(recording), recording.starts
     calm = {name: bridged(values, starts) for name, values in recording.channels.items()}
     calm["time_s"] = recording.time_s
-    seen = dict(calm)
-    for name in recording.channels:
+    seen, off = dict(calm), {}
+    for name, values in recording.channels.items():
+        off[name], rate_off = bridging_errors(values, starts)
         speed = name.replace("position_m", "velocity_m_s").replace("angle_rad", "velocity_rad_s")
         if speed != name and speed not in recording.channels:
             calm[speed], seen[speed] = _slopes(calm[name], recording)
+            off[speed] = rate_off / recording.sample_time_s
     rows = []
     for member in plant.members:
         guesses, others = member.guess(seen), member.guess(calm)
@@ -89,6 +93,7 @@ def sensed_states(plant: Plant, recording: Recording, blind: np.ndarray) -> np.n
             value, deviation = guesses.get(state.quantity, (float(state.initial), state.scale))
             smooth = others.get(state.quantity, (value,))[0]
             deviation = np.maximum(deviation, _near(value - smooth))
+            deviation = np.maximum(deviation, off.get(f"{member.name}.{state.quantity}", 0.0))
             values = np.broadcast_to(np.asarray(value, dtype=float), (n,))
             values = np.where(np.isfinite(values), values, float(state.initial))
             rows.append(np.stack([values, np.where(blind, state.scale, deviation)]))
@@ -114,31 +119,6 @@ def _near(apart: np.ndarray | float) -> np.ndarray | float:
     from scipy.ndimage import maximum_filter1d
 
     return maximum_filter1d(np.abs(apart), SUDDEN_SAMPLES) if np.ndim(apart) else abs(apart)
-
-
-def bridged(values: np.ndarray, starts: tuple[int, ...]) -> np.ndarray:
-    """A channel with straight lines over its holes, piece by piece; the ends are held, (n,)."""
-    found = values.copy()
-    for first, last in zip(starts, (*starts[1:], len(values)), strict=True):
-        piece, seen = values[first:last], np.isfinite(values[first:last])
-        if seen.any() and not seen.all():
-            samples = np.arange(len(piece))
-            found[first:last] = np.interp(samples, samples[seen], piece[seen])
-    return found
-
-
-def long_holes(plant: Plant, recording: Recording) -> np.ndarray:
-    """True inside and next to holes longer than slopes can bridge, in any channel in use, (n,)."""
-    inputs = (signal.name for signal in (*plant.commands, *plant.measured_inputs))
-    used = [name for name in (*plant.measured, *inputs) if name in recording.channels]
-    blind = np.zeros(len(recording), dtype=bool)
-    for name in used:
-        missing = np.concatenate([[False], ~np.isfinite(recording[name]), [False]])
-        edges = np.flatnonzero(np.diff(missing.astype(int)))
-        for first, last in edges.reshape(-1, 2):
-            if last - first > SMOOTHING_SAMPLES:
-                blind[max(first - SMOOTHING_SAMPLES // 2, 0) : last + SMOOTHING_SAMPLES // 2] = True
-    return blind
 
 
 def slope(

@@ -1,10 +1,11 @@
 """S002-6: the bristle by rule, from the forces that a friction map gives.
 
 F_c / 50 um <= sigma_0 <= F_c / 1 um, and sigma_1 <= sigma_2 / (F_s / F_c - 1).  The rig keeps its
-own deflection inside these bounds; beyond them it gets sigma_0 = F_c / 25.3 um, the paper's choice,
-and the largest sigma_1.
+own deflection inside these bounds; beyond them it gets sigma_0 = F_c / 25.3 um, the paper's choice.
+It keeps the bristle's own time tau, so that sigma_1 = sigma_0 tau goes with that stiffness, unless
+sigma_1 is too large: then it gets the largest.  The paper's own, 50 N s/m, is below that.
 
-Source: paper 002 Eqs. 20, 21 (sigma_1 in N s/m, E002-13); physics.md 5, row S002-6.
+Source: paper 002 Eqs. 20, 21 (sigma_1 in N s/m, E002-13); physics.md 2.4 and 5, row S002-6.
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ def bristle(effect: StribeckFriction, estimates: Sequence[Estimate]) -> list[Est
     own = static / effect.breakaway_deflection_m
     inside = coulomb / DEFLECTION_M[1] <= own <= coulomb / DEFLECTION_M[0]
     stiffness = own if inside else coulomb / DEFLECTION_M[2]
-    damping = min(own * effect.bristle_time_s, largest)
+    damping = min(stiffness * effect.bristle_time_s, largest)
     return [
         Estimate(f"{effect.name}.breakaway_deflection_m", static / stiffness, nan),
         Estimate(f"{effect.name}.bristle_time_s", damping / stiffness, nan),
