@@ -24,33 +24,17 @@ from dataclasses import dataclass, field, fields
 from enum import Enum
 from functools import cache
 from math import inf, isfinite
-from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import casadi as ca
 import numpy as np
 
+from workbench.conditions import Conditions
+
 if TYPE_CHECKING:
     from workbench.balances import BalanceEquation
 
 Expression = float | ca.SX
-
-
-class Conditions(dict[str, SimpleNamespace]):
-    """The plant at one instant, in SI units: ``now["chamber_a"].pressure_pa``."""
-
-    def __missing__(self, part: str) -> SimpleNamespace:
-        raise KeyError(f"the plant has no {part!r}; it has {', '.join(self)}")
-
-    def place(self, name: str, value: Expression) -> None:
-        """Set a quantity by its full name, for example ``chamber_a.pressure_pa``."""
-        part, _, quantity = name.rpartition(".")
-        setattr(self.setdefault(part, SimpleNamespace()), quantity, value)
-
-    def read(self, name: str) -> Expression:
-        """Get a quantity by its full name."""
-        part, _, quantity = name.rpartition(".")
-        return getattr(self[part], quantity)
 
 
 @dataclass(frozen=True)
@@ -162,7 +146,7 @@ class Cause:
     forms       fields that are fitted once the strength is
     balance     the equation it enters
     drivers     quantities that reveal it, for people: ``velocity``, ``pressure difference``
-    kinked      the derivative at the null is not to be trusted: use secants
+    kinked      the derivative at the null is not to be trusted: slopes are tested by secants
     kind, held  a shift of the fitted field ``held`` is scored with that field at its prior
     sizes       shares of the typical strength that the scan tries (both signs where signed)
     shapes      values of form fields to scan, by field

@@ -13,6 +13,7 @@ import casadi as ca
 import numpy as np
 
 from workbench.candidate import Candidate
+from workbench.conditions import no_rate
 from workbench.effect import Cause, Conditions, Effect, Expression, Parameter, Part, State, Term
 from workbench.errors import UnknownNameError, nearest
 from workbench.model import Model, flow_paths
@@ -209,7 +210,10 @@ class Plant:
             for member in plant.members
             for quantity, rate in member.rates(now, received).items()
         }
-        outputs = (plant._altered(n, now.read(n), now) for n in self.measured)
+        for name in x:
+            if name not in rates:
+                raise no_rate(name, rates)
+        outputs = (plant._altered(n, now.read(n, "measured"), now) for n in self.measured)
         return Model(
             states=tuple(x),
             commands=tuple(u),

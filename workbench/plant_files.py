@@ -17,8 +17,11 @@ from hashlib import sha256
 from pathlib import Path
 from types import ModuleType
 
+from workbench.conditions import UnknownQuantityError
+from workbench.effect import Effect
 from workbench.errors import InputError, Message, listed, nearest
 from workbench.plant import Plant
+from workbench.plant_checks import check_plant
 from workbench.plants import PLANTS
 
 
@@ -79,7 +82,7 @@ def _built(module: ModuleType, function: str) -> Plant:
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise InputError(Message(f"{listed(twice)} stands twice in it", f"{function}()"))
-    _ = plant.model  # what does not fit together shows here, not in the middle of a run
+    check_plant(plant)  # what does not fit together shows here, not in the middle of a run
     return plant
 
 
@@ -108,17 +111,55 @@ def _loaded(path: Path) -> ModuleType:
 
 @contextmanager
 def _blamed(path: Path, name: str) -> Iterator[None]:
-    """Errors of a user's file as one message with its line there."""
+    """Errors of a user's file as messages with the name of the plant, and the line if there is one.
+
+    What the file itself is not seen to do is put down to the member that was asked.
+    """
     try:
         yield
-    except InputError:
-        raise
+    except UnknownQuantityError as error:
+        raise InputError(_placed(error.message, name, _where(error, path))) from error
+    except InputError as error:
+        where = _where(error, path)
+        raise InputError(*(_placed(each, name, where) for each in error.messages)) from error
     except SyntaxError as error:
         what = f"{error.msg}, in line {error.lineno} of {Path(error.filename or path).name}"
         raise InputError(Message(what, name)) from error
     except Exception as error:
-        frames = traceback.extract_tb(error.__traceback__)
-        lines = [frame.lineno for frame in frames if frame.filename == str(path)]
-        where = f", in line {lines[-1]} of {path.name}" if lines else ""
-        said = str(error.args[0]) if isinstance(error, KeyError) and error.args else str(error)
-        raise InputError(Message(f"{type(error).__name__}: {said}{where}", name)) from error
+        what = f"{type(error).__name__}: {error}{_called(error, path)}{_where(error, path)}"
+        raise InputError(Message(what, name, nearest=_meant(error))) from error
+
+
+def _placed(message: Message, name: str, where: str) -> Message:
+    """A message as one about the plant, where it does not say what it is about."""
+    if message.name or message.file:
+        return message
+    said, comma, there = message.what.partition("; ")
+    return replace(message, name=name, what=said + where + comma + there)
+
+
+def _meant(error: Exception) -> str:
+    """The attribute that looks most like one that is not there."""
+    if not isinstance(error, AttributeError) or not error.name:
+        return ""
+    return nearest(error.name, dir(error.obj))
+
+
+def _called(error: Exception, path: Path) -> str:
+    """The function of ours that a user's line calls and that fails; none where the line does."""
+    *before, last = traceback.extract_tb(error.__traceback__)
+    calls = any(frame.filename == str(path) for frame in before)
+    ours = last.filename != str(path) and last.name.isidentifier() and last.name[0] != "_"
+    return f" in {last.name}()" if calls and ours else ""
+
+
+def _where(error: BaseException, path: Path) -> str:
+    """The last line of a user's file on the way to an error, else the member that was asked."""
+    frames = traceback.extract_tb(error.__traceback__)
+    lines = [frame.lineno for frame in frames if frame.filename == str(path)]
+    if lines:
+        return f", in line {lines[-1]} of {path.name}"
+    seen = [frame.f_locals for frame, _ in traceback.walk_tb(error.__traceback__)]
+    asked = [each.get(key) for each in seen for key in ("member", "self")]
+    members = [each.name for each in asked if isinstance(each, Effect)]
+    return f", asked by {members[-1]}" if members else ""

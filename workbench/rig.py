@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -13,11 +12,13 @@ from workbench.candidate import Candidate
 from workbench.causes import why_not
 from workbench.effect import Parameter
 from workbench.errors import InputError, Message, listed
+from workbench.geometry import require_room
 from workbench.plant import Plant
 from workbench.plant_files import plant_named
 from workbench.recording import Recording
 from workbench.recording_format import RecordingFormat, default_format, read_format
 from workbench.rig_laws import Ranges, is_law, law_terms, read_seen, with_laws
+from workbench.rig_names import parameter_names
 from workbench.rig_text import RigText, read_text
 from workbench.units import (
     STANDARD_ATMOSPHERE_PA,
@@ -145,7 +146,7 @@ def load_rig(path_or_text: Path | str) -> Rig:
     values = _values(text, plant, removed)
     nulls = {plant.candidates[n].strength for n in removed}
     absent = {full: plant.parameters[full].null for full in nulls}
-    rig = dict(
+    known = dict(
         name=text.typed(("name",), str, path.stem if path else name, "a text"),
         added=added,
         removed=removed,
@@ -157,7 +158,9 @@ def load_rig(path_or_text: Path | str) -> Rig:
         path=path,
     )
     text.finish()
-    return Rig(plant=plant.with_values(values | absent), **rig)
+    rig = Rig(plant=plant.with_values(values | absent), **known)
+    require_room(text, rig)
+    return rig
 
 
 def _plant(text: RigText, name: str, path: Path | None) -> Plant:
@@ -168,22 +171,6 @@ def _plant(text: RigText, name: str, path: Path | None) -> Plant:
         line = text.line(("plant",))
         placed = (replace(each, file=text.file, line=line) for each in error.messages)
         raise InputError(*text.messages, *placed) from error
-
-
-def parameter_names(plant: Plant) -> dict[str, tuple[str, ...]]:
-    """Full names of parameters by what a rig file may call them.
-
-    ``slide.mass``; for a cause that lives inside a member ``coulomb_friction.coulomb_force``; for
-    all places of a cause at once ``chamber_leak.area``.
-    """
-    names: dict[str, tuple[str, ...]] = {public_name(full): (full,) for full in plant.values}
-    aliases: dict[str, set[str]] = defaultdict(set)
-    for candidate in plant.candidates.values():
-        for full in filter(None, (candidate.strength, *candidate.forms, candidate.held)):
-            field_name = public_name(full).rpartition(".")[2]
-            aliases[f"{candidate.name}.{field_name}"].add(full)
-            aliases[f"{candidate.cause.name}.{field_name}"].add(full)
-    return {alias: tuple(sorted(full)) for alias, full in aliases.items()} | names
 
 
 def _effects(text: RigText, plant: Plant) -> tuple[tuple[str, ...], tuple[str, ...]]:
