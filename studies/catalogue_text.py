@@ -95,7 +95,8 @@ def candidate_name(plant: Plant, effect: str, at: str | None) -> str:
     Raises
     ------
     InputError
-        If the plant has no such effect, or several and no place is named.
+        If the plant has no such effect, or not at this place, with the nearest one; or if it has
+        several places and none is named.
     """
     if TOGETHER in effect and not at:
         return TOGETHER.join(candidate_name(plant, each, None) for each in effect.split(TOGETHER))
@@ -109,7 +110,10 @@ def candidate_name(plant: Plant, effect: str, at: str | None) -> str:
     if places == [effect]:
         raise InputError(Message("has one place only", effect, "no --at"))
     if places:
-        raise InputError(Message("needs its place", effect, f"--at, for one of {listed(places)}"))
+        parts = [full.partition("@")[2] for full in places]
+        what = "there is no such place" if at else "needs its place"
+        expected, near = f"--at with one of {listed(parts)}", nearest(at, parts) if at else ""
+        raise InputError(Message(what, name, expected, near))
     known = f"one that `workbench effects {plant.name}` lists"
     near = nearest(name, there)
     if is_law(name):

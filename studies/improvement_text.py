@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from studies.documents import Document, diagnosis_document, errors, moved_document
@@ -10,7 +11,9 @@ from studies.plain import plain
 from studies.text import columns, number, removed, spread
 from studies.text_of_law import law_document, law_text
 from studies.text_of_results import errors_over, moved_text, windows_text
+from workbench.candidate import TOGETHER
 from workbench.diagnosis.improvement import Change
+from workbench.diagnosis.judge import HELD_OUT_REASON
 from workbench.diagnosis.result import told
 from workbench.units import public_name
 
@@ -28,6 +31,7 @@ LEFT_OUT = (
     "passes every criterion on top of what is kept, so no law is taken; it is not added: improve "
     "the rig file once more"
 )
+OTHERWISE = "the verdict also weighs by what the model cannot follow, no window counting too much"
 LOWERED = "each row as low as the next diagnosis fits the same model"
 FREE_RUNS = (
     "free runs over whole recordings (no judge where positions integrate: the right effect can "
@@ -68,11 +72,71 @@ def endings(found: Improvement) -> list[str]:
     told = [STOPPED] if found.stopped else []
     told += [USED_UP] if found.used_up else []
     told += [f"{found.left_out} {LEFT_OUT}"] if found.left_out else []
+    told += otherwise_weighed(found)
     told += [] if found.kept else [UNCHANGED]
     for row in found.tolerated:
         size = spread(row.after, row.deviation, row.name)
         told += [f"the rig file also takes {public_name(row.name)} = {size}, which every fit may"]
     return told
+
+
+def otherwise_weighed(found: Improvement) -> list[str]:
+    """Where a bar of the budget rises with a step that the verdict calls no worse, or the reverse.
+
+    Bars are weighed by sensor noise alone, verdicts also by errors that are typical of the model.
+    """
+    claims, told = _claims(found), []
+    for before, after in pairwise(found.budget):
+        claim = claims.get(_claimed(after))
+        if claim is None:
+            continue
+        bars = (
+            ("training", before.train, after.train),
+            ("validation", before.validation, after.validation),
+        )
+        against = [
+            f"{label} {'rises' if now > was else 'falls'} from {number(was)} to {number(now)}"
+            for (label, was, now), less in zip(bars, claim, strict=True)
+            if (now - was) * less > 0.0 and number(now) != number(was)
+        ]
+        if against:
+            moved = " and ".join(against)
+            told.append(f"{after.label}: weighed by sensor noise alone, {moved}; {OTHERWISE}")
+    return told
+
+
+def _claims(found: Improvement) -> dict[str, tuple[float, float]]:
+    """The share of the misfit that a verdict says goes away in both sets, by a bar's label."""
+    added = {f"+ {e.candidate.name}": (e.drop_train, e.drop_validation) for e in found.steps}
+    swapped = {
+        f"{each.rival.name} for {each.candidate.name}": (
+            each.rival_train - each.share_train,
+            each.rival_validation - each.share_validation,
+        )
+        for each in found.swaps
+        if each.replaced
+    }
+    dropped = {
+        f"- {each.candidate.name}": (-each.share_train, _held_out_without(each))
+        for each in found.removals
+        if each.dropped
+    }
+    return added | swapped | dropped
+
+
+def _held_out_without(each: Removal) -> float:
+    """What goes away held out without an effect; more than nothing where it helps none there."""
+    return 1.0 if HELD_OUT_REASON in each.reasons else -each.share_validation
+
+
+def _claimed(stage: Stage) -> str:
+    """Under which label a bar's verdict stands: halves of a pair share theirs; none of a law.
+
+    The terms of a law tell what all of them together remove.
+    """
+    if stage.change is Change.ADDED:
+        return f"+ {stage.label.removeprefix('+ ').split(TOGETHER)[0]}"
+    return "" if stage.change is Change.LAW else stage.label
 
 
 def _lowered(found: Improvement) -> list[str]:

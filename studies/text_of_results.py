@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import isfinite
+from math import isfinite, isnan
 from typing import TYPE_CHECKING
 
 from studies.text import columns, number, percent, removed, shown, spread
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 CORRELATED = 0.9
 SHOWN_STRAINED = 4
+LOST = "which leaves too few for an RMSE"
 BEFORE_AFTER = ("before", "after")
 ADDED, FITTED = ("without it", "with it"), ("as it came", "fitted")  # the same of a rig's steps
 
@@ -176,7 +177,7 @@ def _left_out(sets: Errors, when: str = "") -> list[str]:
     """What the errors do not count, in words."""
     return [
         f"{label}{when}: {name} could not be simulated for {error.left_out} samples"
-        f"{_since(error)}, which its RMSE leaves out"
+        f"{_since(error)}, {LOST if isnan(error.rmse) else 'which its RMSE leaves out'}"
         for label, row in sets.items()
         for name, error in row.items()
         if error.left_out

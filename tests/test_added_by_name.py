@@ -29,3 +29,21 @@ def there():
 def test_what_is_there_is_added_without_a_word_against_it(there):
     assert there.against == ()
     assert "refuse" not in there.rig.notes[-1]
+
+
+@pytest.mark.parametrize(
+    ("more", "effect", "told"),
+    [
+        ('[effects]\nadd = ["coulomb_friction"]\n', "coulomb_friction", "bench has it already"),
+        ('[values]\n"friction.viscous" = "40 N s/m"\n', "viscous_friction", "has it already"),
+        ('[fixed]\nnames = ["friction.coulomb_force"]\n', "coulomb_friction", "bench fixes"),
+        ("", "stiction", r"nothing without friction\.coulomb_force_n"),
+    ],
+)
+def test_what_needs_no_fit_is_refused_before_any(more, effect, told):
+    said, head = [], 'name = "bench"\nplant = "cylinder_bench"\n'
+
+    with pytest.raises(ValueError, match=told):
+        add(load_rig(head + more), effect, [bench(1, nothing)], [bench(2, nothing)], said.append)
+
+    assert said == []

@@ -41,7 +41,22 @@ BAD = {
         "",
         "is it a recording of another plant?",
     ),
-    "text": (_cell(9, 2, "abc"), "", "run.csv:10: 'abc' in column 3 is not a number"),
+    "text": (
+        _cell(9, 2, "#OVL"),
+        "",
+        "run.csv:10: pressure_a_bar: '#OVL' in column 3 is not a number; expected an empty cell "
+        "where nothing was measured",
+    ),
+    "text for a time": (_cell(9, 0, "x"), "", "'x' in column 1 is not a number; expected numbers"),
+    "date for a time": (
+        _cell(1, 0, "2024-05-02 10:11:12.000"),
+        "",
+        "run.csv:2: time_s: '2024-05-02 10:11:12.000' in column 1 is a date and time; expected "
+        'numbers in s, or the time between rows, time = { step = "1 ms" } in [recording]',
+    ),
+    "clock for a time": (_cell(1, 0, "10:11:12.5Z"), "", "is a time of day; expected numbers"),
+    "day for a time": (_cell(1, 0, "2.5.24"), "", "is a date; expected numbers in s, or the time"),
+    "time for a pressure": (_cell(1, 2, "10:11"), "", "is a time of day; expected numbers"),
     "unclear comma": (
         _cell(9, 2, '"1,234"'),
         "",

@@ -65,3 +65,30 @@ def test_the_two_of_a_pair_stand_on_lines_of_their_own():
 
     lines = axes.get_xticklabels()[1].get_text().splitlines()
     assert lines == ["+ sensor_offset", "@chamber_a.pressure", "+ spring_force"]
+
+
+@pytest.mark.parametrize("share", [0.99, 0.9, 0.8, 0.6, 0.3])
+@pytest.mark.parametrize("count", [3, 6])
+def test_no_size_touches_the_outline_of_a_step_that_changes_little(share, count):
+    stages = [Stage(f"step {k}", 900.0 * share**k, 7e4 * share**k) for k in range(count)]
+    figure = budget_figure(stages)
+    with styled():
+        FigureCanvasAgg(figure).draw()
+    (axes,) = figure.axes
+    tops = [
+        axes.transData.transform((0.0, size))[1]
+        for sizes in ([s.train for s in stages], [s.validation for s in stages])
+        for size in (sizes[0], *sizes)[:count]
+    ]
+    boxes = [words.get_window_extent() for words in axes.texts]
+
+    assert len(boxes) == len(tops) == 2 * count
+    assert not any(box.y0 - 0.5 < top < box.y1 + 0.5 for box, top in zip(boxes, tops, strict=True))
+
+
+def test_bars_say_what_they_are_weighed_by_and_what_is_not_known_has_none():
+    stages = [Stage("as it came", 9.0, 11.0), Stage("+ leak", 2.0, float("nan"))]
+    (axes,) = budget_figure(stages).axes
+
+    assert "weighed by sensor noise alone" in axes.get_title()
+    assert [words.get_text() for words in axes.texts] == ["9", "2", "11"]

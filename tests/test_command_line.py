@@ -202,7 +202,12 @@ def test_a_file_that_is_not_there_is_named(folder):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["chamber_leak"], "needs its place"),
+        (["chamber_leak"], "chamber_leak: needs its place; expected --at with one of chamber_a, "),
+        (
+            ["chamber_leak", "--at", "chambr_a"],
+            "chamber_leak@chambr_a: there is no such place; expected --at with one of chamber_a, "
+            "chamber_b; did you mean 'chamber_a'?",
+        ),
         (["chamber_lek", "--at", "chamber_a"], "did you mean 'chamber_leak@chamber_a'?"),
     ],
 )

@@ -10,8 +10,12 @@ from test_improvement import UNITS, improved, rig, sets  # noqa: F401
 from test_next_recording import asked, demo_rig, rivals  # noqa: F401
 
 from studies.export import save_commands
-from studies.improvement_text import improvement_document
+from studies.improvement_text import endings, improvement_document, improvement_text
 from studies.report.improvement import _next_recording, report_improvement
+from workbench.candidate import TOGETHER
+from workbench.diagnosis.improvement import Change, Stage
+from workbench.diagnosis.judge import HELD_OUT_REASON, SHARE_REASON
+from workbench.diagnosis.passes import Removal, Swap
 
 
 def test_the_report_of_an_improvement_has_each_diagnosis_and_addition(improved, tmp_path):
@@ -62,3 +66,58 @@ def test_the_document_of_an_improvement_holds_its_last_diagnosis(improved):
     assert last["verdict"] == improved.diagnoses[-1].verdict.value
     assert last["sentence"] == told["diagnoses"][-1]
     assert last["contradicted"] is False
+
+
+def budget_of(*bars):
+    """A budget of bars, each with its label, its errors on both sets, and its change."""
+    begun = Stage("parameters refitted", 7313.0, 600.0, Change.REFITTED)
+    return (begun, *(Stage(*bar) for bar in bars))
+
+
+def test_a_bar_that_rises_where_the_verdict_falls_is_told_with_the_weights_of_both(improved):
+    first, second = improved.steps
+    names = [step.candidate.name for step in improved.steps]
+    steps = tuple(replace(step, drop_train=0.7, drop_validation=0.6) for step in (first, second))
+    added, better = f"+ {names[0]}", (f"+ {names[1]}", 31.9, 98.96)
+    found = replace(improved, steps=steps, budget=budget_of((added, 3192.0, 989.56), better))
+    (said,) = endings(found)
+
+    assert said == (
+        f"{added}: weighed by sensor noise alone, validation rises from 600 to 989.6; the verdict "
+        "also weighs by what the model cannot follow, no window counting too much"
+    )
+    assert said in improvement_text(found, UNITS).splitlines()
+    assert improvement_document(found, UNITS)["endings"] == [said]
+    unmoved = replace(found, budget=budget_of((added, 3192.0, 600.0001), better))
+    assert endings(unmoved) == []
+    worse = (replace(first, drop_train=-0.1, drop_validation=-0.1), second)
+    (said,) = endings(replace(found, steps=worse))
+    assert "alone, training falls from 7313 to 3192; the" in said
+
+
+def test_a_pair_and_a_swap_have_the_verdict_of_their_own(improved):
+    first, second = improved.steps
+    one, other = first.candidate, second.candidate
+    steps = tuple(replace(step, drop_train=0.7, drop_validation=0.6) for step in (first, second))
+    pair = budget_of((f"+ {TOGETHER.join((one.name, other.name))}", 8000.0, 900.0))
+    (said,) = endings(replace(improved, steps=steps, budget=pair))
+    assert "training rises from 7313 to 8000 and validation rises from 600 to 900" in said
+
+    swap = Swap(one, other, 0.5, 0.5, 0.6, 0.7, replaced=True)
+    bars = budget_of((f"{other.name} for {one.name}", 7000.0, 700.0, Change.SWAPPED))
+    (said,) = endings(replace(improved, swaps=(swap,), budget=bars))
+    assert "validation rises from 600 to 700" in said and "training" not in said
+
+
+def test_an_effect_that_is_dropped_although_bars_rise_is_told(improved):
+    candidate = improved.steps[0].candidate
+    worse = Removal(candidate, 0.08, 0.05, reasons=(HELD_OUT_REASON,), dropped=True)
+    bars = budget_of((f"- {candidate.name}", 7000.0, 900.0, Change.DROPPED))
+    found = replace(improved, removals=(worse,), budget=bars)
+    (said,) = endings(found)
+    assert said.startswith(f"- {candidate.name}: ")
+    assert "validation rises from 600 to 900" in said and "training falls from 7313" in said
+
+    small = replace(worse, reasons=(SHARE_REASON,))
+    rises = budget_of((f"- {candidate.name}", 8000.0, 900.0, Change.DROPPED))
+    assert endings(replace(found, removals=(small,), budget=rises)) == []

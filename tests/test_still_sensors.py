@@ -6,12 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_adversarial_recordings import PLACE, A, demo, said  # noqa: F401
+from test_adversarial_recordings import COMMAND, PLACE, A, demo, said  # noqa: F401
 
 from studies import adversarial as spoil
+from workbench.comparison import compare
 from workbench.consistency import Weight, trusted
+from workbench.reading import RecordingWarning
 from workbench.recording import Recording
 from workbench.rig import default_rig
+from workbench.simulation import simulate
 
 
 @pytest.mark.parametrize(("name", "step"), [(PLACE, 2e-4), (A, 2e3)])
@@ -35,3 +38,42 @@ def test_a_sensor_that_sticks_makes_no_clock_uneven():
     stood = Recording("stood", 0.1, {"chamber.pressure_pa": pressure})
 
     assert said(default_rig("closed_chamber"), stood) == []
+
+
+def test_a_constant_output_is_told_and_stops_nothing(demo):
+    """It has no noise: any motion of the plant is more."""
+    rig, train, _ = demo
+    dead = replace(train, channels={**train.channels, A: np.full(len(train), train[A][0])})
+    ((kept,),), findings = trusted(rig, [dead])
+    (finding,) = findings
+
+    assert said(rig, dead) == [(Weight.NOTICE, f"{finding.channel} {finding.what}")]
+    assert finding.what.startswith("stands at 5.6079 bar from 0 to 9.999 s, while the plant")
+    assert np.isfinite(kept[A]).all()
+    with pytest.warns(RecordingWarning, match="stands at"):
+        compare(rig, [dead])
+
+
+def test_nothing_is_said_of_a_constant_output_of_a_plant_at_rest():
+    chamber = default_rig("closed_chamber")
+    level_pa = chamber.ambient_pa
+    still = Recording("still", 0.1, {"chamber.pressure_pa": np.full(400, level_pa)})
+
+    assert said(chamber, still) == []
+
+
+def test_noise_that_may_be_slow_sampling_says_so(demo):
+    """Every 50 ms of what moves within less looks like noise from sample to sample."""
+    rig, train, _ = demo
+    rng = np.random.default_rng(3)
+    noise = replace(train, channels={**train.channels, A: 5e5 + 1e4 * rng.standard_normal(10_000)})
+    ((_, told),) = said(rig, noise)
+    command_v = 5.0 + 2.0 * rng.standard_normal(400)
+    fast = simulate(rig.plant, Recording("fast", 1e-3, {COMMAND: np.repeat(command_v, 20)}))
+    every = {name: values[::50] for name, values in fast.channels.items()}
+    slow = said(rig, Recording("slow", 0.05, every))
+
+    assert "is noise: " in told and "slowly" not in told
+    assert slow and all(
+        "is noise, or sampled too slowly (50 ms) for what moves here: " in line for _, line in slow
+    )

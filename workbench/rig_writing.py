@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from workbench.errors import InputError
 from workbench.plant import Plant
 from workbench.plant_files import as_it_came, plant_text
 from workbench.recording_format import default_format, format_lines
-from workbench.rig import ACCEPTED, Rig
+from workbench.rig import ACCEPTED, Rig, parameter_names
 from workbench.rig_laws import seen_lines, with_laws
-from workbench.rig_text import quoted
+from workbench.rig_text import RigText, quoted, read_text
 from workbench.units import public_name, written
 from workbench.whole_file import whole_file
 
@@ -17,8 +18,9 @@ from workbench.whole_file import whole_file
 def write_rig(rig: Rig, path: Path | str) -> None:
     """The rig as a TOML file: what differs from the plant's own, and what is known of it.
 
-    Parameters with a standard deviation, such as fitted ones, are written with their value even
-    where that is the plant's own.  The file appears only once it is complete.
+    Parameters with a standard deviation, such as fitted ones, and those that the rig's own file
+    names are written with their value even where that is the plant's own.  The file appears only
+    once it is complete.
     """
     with whole_file(path) as unfinished:
         unfinished.write_text(rig_text(rig, Path(path).parent), encoding="utf-8")
@@ -47,11 +49,28 @@ def rig_text(rig: Rig, folder: Path | None = None) -> str:
 def _told(rig: Rig, own: Plant) -> dict[str, float]:
     """Values that the file must hold, by full name, beside those of the plant as it came."""
     absent = {own.candidates[name].strength for name in rig.removed}
+    kept = rig.deviations.keys() | _named(rig, own)
     return {
         name: value
         for name, value in rig.plant.values.items()
-        if name not in absent and (value != own.values[name] or name in rig.deviations)
+        if name not in absent and (value != own.values[name] or name in kept)
     }
+
+
+def _named(rig: Rig, own: Plant) -> set[str]:
+    """Full names of the values that the file which the rig was read from holds now.
+
+    Whoever wrote one that is the plant's own means it to stay, should the plant's change.
+    """
+    if rig.path is None:
+        return set()
+    try:
+        content, _ = read_text(rig.path)
+        named = RigText(content, str(rig.path)).flat("values")
+    except InputError:  # gone or changed since: only what it would keep is lost
+        return set()
+    names = parameter_names(own)
+    return {full for key in named for full in names.get(key, ())}
 
 
 def _section(title: str, entries: dict[str, str]) -> list[str]:

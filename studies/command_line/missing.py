@@ -1,5 +1,6 @@
 """Commands that find what a plant lacks and put it in: diagnose, add, improve, fit."""
 
+import warnings
 from pathlib import Path
 from typing import Annotated
 
@@ -31,6 +32,13 @@ IMPROVE = "workbench improve rig.toml train.csv --validate validation.csv -o rig
 PLAYABLE = "with --figures DIR: its commands as a CSV, and what each rival would record as a figure"
 LAW = "law"  # in place of an effect: the empirical law that explains most
 FIT = "workbench fit rig.toml train.csv --validate validation.csv -o rig2.toml"
+
+
+def _warn_in_place(rig: Path, output: Path) -> None:
+    """A word where the rig file that is read is the one to be written: comments do not survive."""
+    if output.exists() and rig.exists() and output.samefile(rig):
+        what = "is the rig file that is read, and is written anew: its own comments and order are "
+        warnings.warn(f"{output}: {what}lost; another name for -o keeps it", stacklevel=2)
 
 
 @app.command(cls=Spread, epilog=example(DIAGNOSE))
@@ -103,6 +111,7 @@ def add(
 
         writable(output, reads=[*fit, *(validate or ())])
         known = load_rig(rig)
+        _warn_in_place(rig, output)
         whole_law = effect == LAW and at is None
         name = "" if whole_law else candidate_name(known.plant, effect, at)
         read, held_out = read_to_fit(known, fit, say), read_all(known, validate, say)
@@ -148,6 +157,7 @@ def improve(
         writable(output, reads=[*train, *(validate or ())])
         writable(json, folders=[report], reads=[rig, *train, *(validate or ())], besides=[output])
         known = load_rig(rig)
+        _warn_in_place(rig, output)
         read, held_out = read_to_fit(known, train, say), read_all(known, validate, say)
         found = improve_rig(known, read, held_out, say, law)
         units = unit_names(known.plant.measured + known.plant.optional_outputs)
@@ -185,6 +195,7 @@ def fit(
 
         writable(output, reads=[*train, *(validate or ())])
         known = load_rig(rig)
+        _warn_in_place(rig, output)
         names = full_names(known.plant, only or ())
         read, held_out = read_to_fit(known, train, say, names), read_all(known, validate, say)
         found = fit_rig(known, read, held_out, only=names, progress=say)

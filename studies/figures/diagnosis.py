@@ -25,6 +25,7 @@ from workbench.units import display_scale, display_unit, public_name
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.patches import Rectangle
 
     from workbench.diagnosis.missing_term import Dependence, Loop
     from workbench.diagnosis.result import Diagnosis, Ranked, Where
@@ -32,6 +33,9 @@ if TYPE_CHECKING:
 SHOWN, SHOWN_BALANCES, SHOWN_DRIVERS = 10, 8, 3
 FEWEST_ROWS = 3  # that a panel has room for: one balance alone would be a wall
 HOLLOW = {"color": "white", "edgecolor": GREY, "hatch": "....", "linewidth": 0.6}
+CUT = -20.0  # percent: bars further below zero would leave the others no room
+MINUS = "\N{MINUS SIGN}"  # as on the axis
+LETTER = 5.0  # percent of the axis for one of a number beside a bar
 SAID = 0.02  # of the variance of a missing term: less that parameters explain is not said
 
 
@@ -61,9 +65,9 @@ def ranking_figure(found: Diagnosis) -> Figure:
             label.set_fontweight("bold" if row.accepted and named else "normal")
         _draw_drops(axes, rows)
         axes.set_ylim(len(rows) - 0.5, -0.5)
-        axes.set_xlim(0.0, 105.0)
-        axes.set_xlabel("drop of the misfit beyond noise (%)")
+        cut = _scale_drops(axes, len(rows))
         key = "bold: accepted" + ("; =: cannot be told apart here" if tied else "")
+        key += f"\nbars cut at {MINUS}{-CUT:.0f} %, with their length" if cut else ""
         figure.suptitle(f"{found.verdict.value.replace('_', ' ')}\n{key}", fontsize=8)
         if axes.containers:
             figure.legend(loc="outside lower center", ncols=3, columnspacing=1.0)
@@ -88,8 +92,43 @@ def _draw_drops(axes: Axes, rows: Sequence[Ranked]) -> None:
 
 
 def _bar(share: float) -> float:
-    """Length of a bar in percent, as it is told: none for what makes the misfit larger."""
-    return 100.0 * max(told(share), 0.0)
+    """Length of a bar in percent, as it is told: below zero for what makes the misfit larger."""
+    return 100.0 * told(share)
+
+
+def _scale_drops(axes: Axes, count: int) -> bool:
+    """The axis of the bars; what goes far below zero is cut there, its number beside it.
+
+    The bars keep their lengths, and with them the table of what is drawn.  True where any is cut.
+    """
+    bars = [bar for group in axes.containers for bar in group]
+    axes.set_xlim(0.0, 105.0)
+    axes.set_xlabel("drop of the misfit beyond noise (%)")
+    if not any(bar.get_width() < 0.0 for bar in bars):
+        return False
+    axes.vlines(0.0, -0.5, count - 0.5, color=GREY, linewidth=0.6)
+    axes.set_xticks(range(int(CUT), 101, 20))
+    axes.set_xlim(CUT, 105.0)
+    told_beside = [_cut(axes, bar, count) for bar in bars if bar.get_width() < CUT]
+    if told_beside:
+        axes.set_xlim(CUT - LETTER * max(map(len, told_beside)), 105.0)
+    return bool(told_beside)
+
+
+def _cut(axes: Axes, bar: Rectangle, count: int) -> str:
+    """Cut a bar, and write its length at its end."""
+    from matplotlib.patches import Rectangle
+
+    shown = Rectangle((CUT, -0.5), 105.0 - CUT, count, transform=axes.transData)
+    bar.set_clip_path(shown)
+    length = bar.get_width()
+    words = MINUS + (f"{-length:.0f}" if length > -1e3 else f"{-length:.0e}")
+    middle = bar.get_y() + 0.5 * bar.get_height()
+    axes.annotate(
+        words, (CUT, middle), (-1.5, 0.0), textcoords="offset points",
+        ha="right", va="center", fontsize=6,
+    )  # fmt: skip
+    return words
 
 
 def _ranked_name(name: str, tied: set[str]) -> str:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 WIDE_FROM = 3  # bars that one column holds
 HEADROOM = 0.15  # of the height of the axis, above the highest bar
+NEAR = 0.14  # of that height: what a number above a bar takes
 LETTER_IN = 0.055  # width of one in a label
 LOOKS = ((GREY, ""), (ORANGE, "////"), (BLUE, ""))  # of the states of a rig, the last one best
 SLANT = {"rotation": 30, "ha": "right", "rotation_mode": "anchor"}
@@ -49,10 +50,7 @@ def budget_figure(budget: Sequence[Stage]) -> Figure:
             ("validation", [stage.validation for stage in budget], ORANGE, "////"),
         )
         for offset, (label, values, colour, hatch) in zip((-0.2, 0.2), sets, strict=True):
-            bars = axes.bar(places + offset, values, 0.38, color=colour, hatch=hatch, label=label)
-            words = axes.bar_label(bars, fmt="%.3g", fontsize=6, padding=1.5)
-            for word in words:  # an outline may run behind it
-                word.set_bbox({"facecolor": "white", "edgecolor": "none", "pad": 0.2})
+            axes.bar(places + offset, values, 0.38, color=colour, hatch=hatch, label=label)
             falls = [before - after for before, after in pairwise(values)]
             axes.bar(
                 places[1:] + offset, falls, 0.38, values[1:], label=f"change of {label}",
@@ -61,12 +59,29 @@ def budget_figure(budget: Sequence[Stage]) -> Figure:
         _mark(axes, budget)
         axes.grid(False, axis="x")
         _logarithmic(axes, [value for _, values, *_ in sets for value in values])
+        for offset, (_, values, *_) in zip((-0.2, 0.2), sets, strict=True):
+            _write_sizes(axes, places + offset, values)
         axes.set_ylabel("weighted squared error\nper sample (-)")
-        axes.set_title("error after each step")
+        axes.set_title("error after each step, weighed by sensor noise alone")
         filled, outlines = axes.containers[::2], axes.containers[1:2]
         named = ["training", "validation", "what the step changed"]
         figure.legend([*filled, *outlines], named, loc="outside lower center", ncols=3)
     return figure
+
+
+def _write_sizes(axes: Axes, places: np.ndarray, values: Sequence[float]) -> None:
+    """The size of each bar above it, and above its outline where that ends close to the bar."""
+    low, high = axes.get_ylim()
+    close = (high / low) ** NEAR
+    behind = {"facecolor": "white", "edgecolor": "none", "pad": 0.2}  # an outline's side may run
+    for place, before, now in zip(places, [values[0], *values], values, strict=False):
+        if not isfinite(now):
+            continue
+        top = before if now < before < now * close else now
+        axes.annotate(
+            f"{now:.3g}".replace("e+0", "e"), (place, top), (0.0, 1.5), textcoords="offset points",
+            ha="center", va="bottom", fontsize=6, bbox=behind,
+        )  # fmt: skip
 
 
 def _broken(label: str) -> str:

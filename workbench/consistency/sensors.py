@@ -18,7 +18,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from workbench.consistency.explained import Probe, predicted_motion
+from workbench.consistency.explained import Probe, predicted_motion, probe
 from workbench.consistency.findings import Finding, Weight
 from workbench.effects.forces import EndStops
 from workbench.fitting.noise import THIRD_DIFFERENCE_GAIN, NoNoiseError, measured_noise
@@ -31,6 +31,7 @@ from workbench.saturation import saturated
 from workbench.units import display_unit, public_name, scale
 
 WHITE = 0.8  # of a channel's standard deviation is that of white noise
+SPARSE = 0.2  # of what moves in a window moves between two samples: these are far apart
 OUTSIDE = 0.2  # of the stroke: a position that far beyond a stop cannot be
 LEAST_STUCK = 0.02  # of a recording
 SILENT = 20  # times as long as usual without a sample, and at least so many samples
@@ -38,6 +39,7 @@ WORTH_A_WORD = 0.1  # of a recording, missing in such stretches
 LOOKED_AT = 8  # windows of a stretch in which a sensor may be stuck
 UNEVEN = 0.1  # of a sample: a clock that ticks as unevenly as that is worth a word
 CLEARLY = 10.0  # noise deviations: a motion that a sensor cannot miss
+SOLVED = 1e-6  # of a value: so far a plant at rest may drift in a solver
 STEEPEST = 0.2  # share of the samples at which an uneven clock shows most
 FINE = 0.05  # of a sample: the jitter that a channel must be able to show
 MEDIAN_OF_NORMAL = 0.6745
@@ -54,10 +56,29 @@ def noisy(plant: Plant, recording: Recording, unexplained: np.ndarray) -> list[F
     for name, share in zip(plant.measured, unexplained, strict=True):
         white = _white_share(recording, name)
         if white > WHITE and share > 1.0 and not _small(plant, recording, name):
-            what = f"is noise: {min(white, 1.0):.0%} of it changes at random from sample to sample"
-            remedy = "check the wiring, or leave the channel out of [recording.channels]"
+            slow = _sparse(plant, recording, name)
+            each_ms = 1e3 * recording.sample_time_s
+            also = f", or sampled too slowly ({each_ms:.4g} ms) for what moves here" if slow else ""
+            what = f"is noise{also}: {min(white, 1.0):.0%} of it changes at random from sample to "
+            what += "sample"
+            remedy = f"check the wiring{', log more often' if slow else ''}, or leave the channel "
+            remedy += "out of [recording.channels]"
             found.append(_finding(Weight.REFUSED, recording, name, what, remedy))
     return found
+
+
+def _sparse(plant: Plant, recording: Recording, name: str) -> bool:
+    """Whether the plant says that an output changes much from one sample to the next.
+
+    Then samples are far apart for it, and what it truly does looks like noise.
+    """
+    where = probe(plant, recording)
+    if where is None:
+        return False
+    lengths, k = (2, where.length), plant.measured.index(name)
+    motions = (predicted_motion(plant, recording, replace(where, length=n))[k] for n in lengths)
+    next_one, whole = (float(np.sqrt(np.nanmean(motion**2))) for motion in motions)
+    return next_one > SPARSE * whole
 
 
 def _driven(plant: Plant, recording: Recording) -> bool:
@@ -103,7 +124,7 @@ def beyond_stops(plant: Plant, recording: Recording) -> list[Finding]:
         if max(low_m - least_m, most_m - high_m) > OUTSIDE * (high_m - low_m):
             what = f"moves from {least_m:.4g} to {most_m:.4g} m, between stops at {low_m:.4g} and "
             what += f"{high_m:.4g} m"
-            remedy = "another unit, sign or zero, or other stops in [values]"
+            remedy = "another unit, sign or zero, or other stops and chambers in [values]"
             found.append(_finding(Weight.REFUSED, recording, name, what, remedy))
     return found
 
@@ -209,8 +230,18 @@ def _should_move(plant: Plant, recording: Recording, name: str, stretch: tuple[i
         return False
     chosen = tuple(firsts[k] for k in evenly(len(firsts), min(LOOKED_AT, len(firsts))))
     motion = predicted_motion(plant, recording, Probe(chosen, size))
-    usual = measured_noise([recording], [name])[name]
+    usual = _noise(recording, name)
+    if usual is None:
+        usual = SOLVED * float(np.nanmax(np.abs(recording[name])))
     return bool(np.median(motion[plant.measured.index(name)]) > CLEARLY * usual)
+
+
+def _noise(recording: Recording, name: str) -> float | None:
+    """Noise of a channel in SI; None where it shows none, as where it is constant."""
+    try:
+        return measured_noise([recording], [name])[name]
+    except NoNoiseError:
+        return None
 
 
 def uneven_clock(plant: Plant, recording: Recording) -> list[Finding]:
@@ -239,9 +270,8 @@ def _jitter(recording: Recording, name: str) -> tuple[float, float]:
         values = recording[name].copy()
         values[first : first + length] = np.nan
         recording = replace(recording, channels={**recording.channels, name: values})
-    try:
-        noise = measured_noise([replace(recording, noise={})], [name])[name]
-    except NoNoiseError:
+    noise = _noise(replace(recording, noise={}), name)
+    if noise is None:
         return 0.0, np.inf
     third, slope = [], []
     for piece in recording.pieces:

@@ -19,7 +19,7 @@ from workbench.diagnosis.result import Diagnosis, Evidence, Ranked, told
 from workbench.diagnosis.rough import rough_fit
 from workbench.diagnosis.scan import scan
 from workbench.diagnosis.settle import settled_refit
-from workbench.fitting.errors import Errors, errors_of
+from workbench.fitting.errors import Errors, errors_of, require_simulated
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.posterior import (
     Moved,
@@ -27,7 +27,8 @@ from workbench.fitting.posterior import (
     moved_parameters,
     posterior_deviation,
 )
-from workbench.fitting.problem import BELIEVED, Problem, pose
+from workbench.fitting.problem import BELIEVED, Problem, pose, staged
+from workbench.fitting.unknowns import nominal_unknowns
 from workbench.law_range import ranges_text
 from workbench.plant import Plant
 from workbench.recording import Recording
@@ -76,6 +77,8 @@ def add(
     ValueError
         If the effect is there already, only a shift of a parameter that is fitted anyway, fixed by
         the rig, or a change of something that the plant lacks; or if there are more than two.
+    ArithmeticError
+        If most samples of an output cannot be simulated with it.
     """
     train, validation, evidence = with_held_out(rig, train, validation)
     if is_law(name):
@@ -84,15 +87,16 @@ def add(
     names = _names_in(name)
     require_place(rig, plant, names)
     candidates = [plant.candidates[each] for each in names]
-    problem = pose(rig, train, validation, believed=BELIEVED, progress=progress)
     for candidate in candidates:
-        _require_absent(rig, plant, problem, candidate)
+        _require_absent(rig, plant, candidate)
+    problem = pose(rig, train, validation, believed=BELIEVED, progress=progress)
     progress(f"refit with {name}")
     base = problem.base
     at = base.windows, base.unknowns, base.point
     profiles = scan(problem.whole, *at, candidates, fixed=rig.fixed)
     begun = rough_fit(problem, profiles[0]) if len(names) == 1 else pair_fit(problem, profiles)
     found = refit_shaken(problem, refit(problem, begun))
+    require_simulated(f"with {name}", found.fit, found.validation)
     evidence = weighed(evidence, problem.base_validation)
     step = refitted_addition(rig, problem, found, evidence)
     return with_objections(step, reasons_against(problem.base, found))
@@ -127,10 +131,10 @@ def _names_in(name: str) -> list[str]:
     return names
 
 
-def _require_absent(rig: Rig, plant: Plant, problem: Problem, candidate: Candidate) -> None:
+def _require_absent(rig: Rig, plant: Plant, candidate: Candidate) -> None:
     """Raise ValueError where a candidate is there already or has nothing to be fitted."""
-    name = candidate.name
-    if candidate in problem.added or _present(problem, candidate):
+    name, added = candidate.name, rig.added_to(plant)
+    if candidate in added or _present(rig, plant, added, candidate):
         raise ValueError(f"{name}: {rig.name} has it already; fit moves it")
     if not plant.ready_for(candidate):
         raise ValueError(f"{name}: nothing without {candidate.member}.{candidate.cause.needs}")
@@ -210,9 +214,10 @@ def apart(step: Addition) -> tuple[Addition, ...]:
     return tuple(halves)
 
 
-def _present(problem: Problem, candidate: Candidate) -> bool:
-    """True where the base fit moves the cause already."""
-    moved = problem.base.unknowns.names
+def _present(rig: Rig, plant: Plant, added: Sequence[Candidate], candidate: Candidate) -> bool:
+    """True where the prior fit moves the cause already; no fit is needed to know."""
+    lean = staged(plant, *(each.member for each in added))
+    moved = nominal_unknowns(lean, rig.deviations, rig.fixed, added).names
     return candidate.held in moved or (
         candidate.strength in moved and not candidate.cause.tolerated
     )

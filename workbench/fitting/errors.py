@@ -41,6 +41,8 @@ class SignalError:
         return (self.rmse / self.noise) ** 2
 
 
+MOST = 0.5  # of the recorded samples of an output
+LEAST_SIMULATED = 0.05  # of the recorded samples: starts alone, which are free, tell no error
 AT_NOISE = 1.5  # mean square of an output's error over that of its noise
 COLOURED = 0.1  # of a mean square, beyond what successive differences tell of it
 CHANCE = 5.0  # deviations of that share, 1 / sqrt(n) each, for white noise
@@ -56,16 +58,18 @@ def in_units(fit: Fit) -> np.ndarray:
 def signal_errors(fit: Fit) -> dict[str, SignalError]:
     """RMSE and fit percent of each output over all windows, by public name.
 
-    Samples that could not be simulated are counted, not mixed in; NaN where none could be.  Fit
-    percent is MATLAB's 100 (1 - |y - yhat| / |y - mean(y)|), over windows with free start.
+    Samples that could not be simulated are counted, not mixed in; NaN where hardly any could be:
+    the first of each window is its free start, which has no error.  Fit percent is MATLAB's
+    100 (1 - |y - yhat| / |y - mean(y)|), over windows with free start.
     """
     windows = fit.windows
     error = in_units(fit)
     found, lost = {}, fit.unsimulated
     for k, name in enumerate(windows.plant.measured):
-        seen = np.isfinite(windows.measured[k]) & ~lost[k]
+        recorded = np.isfinite(windows.measured[k])
+        seen = recorded & ~lost[k]
         noise, left_out = float(windows.noise[k]), (int(lost[k].sum()), _first(windows, lost[k]))
-        if not seen.any():
+        if seen.sum() <= LEAST_SIMULATED * recorded.sum():
             found[public_name(name)] = SignalError(np.nan, np.nan, noise, *left_out)
             continue
         values, e = windows.measured[k][seen], error[k][seen]
@@ -74,6 +78,32 @@ def signal_errors(fit: Fit) -> dict[str, SignalError]:
         rmse = float(np.sqrt(np.mean(e**2)))
         found[public_name(name)] = SignalError(rmse, percent, noise, *left_out)
     return found
+
+
+def require_simulated(when: str, *fits: Fit | None) -> None:
+    """Refuse a plant that most recorded samples of an output could not be simulated with.
+
+    ``when`` says which plant it is, as ``with cogging``.
+
+    Raises
+    ------
+    ArithmeticError
+        With the first such output, how many samples it loses, and where the first of them lies.
+    """
+    for fit in (each for each in fits if each is not None):
+        windows = fit.windows
+        for name, values, lost in zip(
+            windows.plant.measured, windows.measured, fit.unsimulated, strict=True
+        ):
+            recorded, gone = int(np.isfinite(values).sum()), int(lost.sum())
+            if gone <= MOST * recorded:
+                continue
+            place = _first(windows, lost)
+            raise ArithmeticError(
+                f"{public_name(name)}: {when}, {gone} of {recorded} samples could not be "
+                f"simulated, the first at {place.time_s:.4g} s of {place.recording}; expected "
+                "terms that are finite wherever the plant goes"
+            )
 
 
 def _first(windows: Windows, marked: np.ndarray) -> Place | None:

@@ -10,7 +10,7 @@ import csv
 import re
 import warnings
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -18,7 +18,7 @@ import numpy as np
 
 from workbench.errors import InputError, Message
 from workbench.reading.table import RecordingWarning, Table, open_bytes
-from workbench.recording_format import RecordingFormat
+from workbench.recording_format import RecordingFormat, TimeFormat
 
 NUMBER = re.compile(r"[-+]?(?:[\d.]*\d[\d.]*(?:e[-+]?\d+)?|nan|inf)", re.IGNORECASE)
 COMMA_NUMBER = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?|[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
@@ -30,6 +30,37 @@ BRACKETED = re.compile(r"^[\[(](.*)[\])]$")  # all of it, not the end of ``bar(g
 BINARY = re.compile(r"[\x00-\x08\x0e-\x19\x1b-\x1f\x7f]")  # control characters of no text
 BINARY_SHARE = 0.05  # of them in the first lines; a text has a spoiled cell at the most
 SHOWN = 30  # characters of a cell in a message
+NO_NUMBER = "not a number"
+DATE = r"(\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[-/.]\d{1,2}[-/.]\d{2,4})"
+CLOCK = r"(\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d*)?)?(?: ?[AP]M)?(?:Z| ?[-+]\d{2}:?\d{2})?)"
+STAMP = re.compile(f"{DATE}?[T ]*{CLOCK}?", re.IGNORECASE)  # a time as loggers write it
+
+
+@dataclass(frozen=True)
+class _Body:
+    """Rows of numbers: their text, where they stand, and what their columns are called."""
+
+    file: str
+    lines: list[str]
+    numbers: np.ndarray  # of the lines in the file
+    separator: str
+    names: Sequence[str]  # empty where they stand above no columns
+    time: TimeFormat
+
+    def no_number(self, cell: str, row: int, column: int) -> Message:
+        """What is wrong with a cell, and what would do."""
+        name = self.names[column] if column < len(self.names) else ""
+        kind, timed = _kind(cell), self.time.column in (name, column + 1)
+        expected = "an empty cell where nothing was measured"
+        if timed and kind != NO_NUMBER:
+            between = 'the time between rows, time = { step = "1 ms" } in [recording]'
+            expected = f"numbers in {self.time.unit}, or {between}"
+        elif "," in cell and self.separator == ",":
+            expected = 'decimal or thousands = "," in [recording]'
+        elif timed or kind != NO_NUMBER:
+            expected = f"numbers{f' in {self.time.unit}' if timed else ''}"
+        what = f"{cell[:SHOWN]!r} in column {column + 1} is {kind}"
+        return Message(what, name, expected, file=self.file, line=int(self.numbers[row]))
 
 
 def text_table(path: Path, reader: RecordingFormat) -> Table:
@@ -77,7 +108,8 @@ def text_table(path: Path, reader: RecordingFormat) -> Table:
         expected = "a name above each column, or numbers of columns in [recording]"
         raise InputError(Message(what, expected=expected, file=file, line=head[0]))
     n_columns = max(len(names), len(cells))
-    load = partial(_load, body=body, separator=separator, file=file, numbers=numbers)
+    told_names = names if _aligned(names, cells, separator) else []
+    load = partial(_load, body=_Body(file, body, numbers, separator, told_names, reader.time))
     told = [BRACKETED.sub(r"\1", word) for word in _names(units, separator)] if units else []
     return Table(file, names, n_columns, load, lambda row: f"line {numbers[row]}", told)
 
@@ -181,26 +213,23 @@ def _by_name(reader: RecordingFormat) -> bool:
     return any(isinstance(column, str) for column in (*timed, *columns))
 
 
-def _load(
-    wanted: Sequence[int], body: list[str], separator: str, file: str, numbers: np.ndarray
-) -> np.ndarray:
-    delimiter = None if separator == " " else separator
+def _load(wanted: Sequence[int], body: _Body) -> np.ndarray:
+    delimiter = None if body.separator == " " else body.separator
     try:
-        found = np.loadtxt(body, delimiter=delimiter, usecols=wanted, ndmin=2, comments=None)
+        found = np.loadtxt(body.lines, delimiter=delimiter, usecols=wanted, ndmin=2, comments=None)
     except ValueError:
-        return _cell_by_cell(wanted, body, separator, file, numbers)
+        return _cell_by_cell(wanted, body)
     return found.T
 
 
-def _cell_by_cell(
-    wanted: Sequence[int], body: list[str], separator: str, file: str, numbers: np.ndarray
-) -> np.ndarray:
+def _cell_by_cell(wanted: Sequence[int], body: _Body) -> np.ndarray:
     """The columns with NaN where a cell is empty or says so; names the first that is no number."""
-    found = np.full((len(wanted), len(body)), np.nan)
-    for row, line in enumerate(body):
-        cells, place = _cells(line, separator), int(numbers[row])
+    file, count = body.file, len(body.lines)
+    found = np.full((len(wanted), count), np.nan)
+    for row, line in enumerate(body.lines):
+        cells, place = _cells(line, body.separator), int(body.numbers[row])
         if len(cells) <= max(wanted):
-            if row == len(body) - 1:
+            if row == count - 1:
                 warnings.warn(f"{file}:{place}: unfinished row left out", RecordingWarning, 2)
                 return found[:, :-1]
             what = f"this row has {len(cells)} columns"
@@ -212,8 +241,14 @@ def _cell_by_cell(
             try:
                 found[i, row] = float(cells[column])
             except ValueError:
-                what = f"{cells[column][:SHOWN]!r} in column {column + 1} is not a number"
-                unclear = "," in cells[column] and separator == ","
-                expected = 'decimal or thousands = "," in [recording]' if unclear else ""
-                raise InputError(Message(what, expected=expected, file=file, line=place)) from None
+                raise InputError(body.no_number(cells[column], row, column)) from None
     return found
+
+
+def _kind(cell: str) -> str:
+    """What a cell is that is no number: a time as loggers write it, or anything."""
+    stamp = STAMP.fullmatch(cell.strip("\"'"))
+    date, clock = stamp.groups() if stamp else (None, None)
+    if date and clock:
+        return "a date and time"
+    return "a date" if date else "a time of day" if clock else NO_NUMBER
