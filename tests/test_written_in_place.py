@@ -55,6 +55,6 @@ def test_whoever_writes_over_the_rig_that_is_read_is_told(rig_file, tmp_path):
     said = [call(*words, out) for out in (other, rig_file)]
 
     assert [answer.exit_code for answer in said] == [0, 0]
-    assert "is the rig file that is read" not in said[0].stderr
+    assert "is a rig file that is read" not in said[0].stderr
     (line,) = (line for line in said[1].stderr.splitlines() if "comments" in line)
-    assert line.startswith(f"warning: {rig_file}: is the rig file that is read")
+    assert line.startswith(f"warning: {rig_file}: is a rig file that is read")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -76,6 +77,13 @@ def text_to_write(path: Path) -> None:
     if path.suffix.lower() in BINARY:
         what = f"recordings are written as CSV, not as {path.suffix}"
         raise InputError(Message(what, str(path), f"{path.with_suffix('.csv')}"))
+
+
+def warn_in_place(output: Path | None, *rigs: Path | None) -> None:
+    """A word where a rig file that is read is the one to be written: comments do not survive."""
+    if output and any(_same(output, rig) for rig in filter(None, rigs)):
+        what = "is a rig file that is read, and is written anew: its own comments and order are "
+        warnings.warn(f"{output}: {what}lost; another name for -o keeps it", stacklevel=2)
 
 
 def _same(path: Path, other: Path) -> bool:

@@ -15,7 +15,7 @@ from studies.command_line.application import (
     command_text,
     example,
 )
-from studies.command_line.files import read_all, writable, write_json
+from studies.command_line.files import read_all, warn_in_place, writable, write_json
 
 IDENTIFY = "workbench identify friction drive4.toml run_*.csv stick_*.csv -o drive5.toml"
 
@@ -75,6 +75,7 @@ def identify(
         writable(output, reads=recordings)
         writable(json, folders=[figures], reads=[rig, into, *recordings], besides=[output])
         known, other = load_rig(rig), load_rig(into) if into else None
+        warn_in_place(output, rig, into)
         read = read_all(known, recordings, say)
         say(f"identifying {chosen.gives}")
         found = chosen.run(known, read)

@@ -1,6 +1,5 @@
 """Commands that find what a plant lacks and put it in: diagnose, add, improve, fit."""
 
-import warnings
 from pathlib import Path
 from typing import Annotated
 
@@ -21,7 +20,13 @@ from studies.command_line.application import (
     command_text,
     example,
 )
-from studies.command_line.files import read_all, read_to_fit, writable, write_json
+from studies.command_line.files import (
+    read_all,
+    read_to_fit,
+    warn_in_place,
+    writable,
+    write_json,
+)
 
 DIAGNOSE = "workbench diagnose rig.toml train.csv --validate validation.csv --json found.json"
 ADD = (
@@ -32,13 +37,6 @@ IMPROVE = "workbench improve rig.toml train.csv --validate validation.csv -o rig
 PLAYABLE = "with --figures DIR: its commands as a CSV, and what each rival would record as a figure"
 LAW = "law"  # in place of an effect: the empirical law that explains most
 FIT = "workbench fit rig.toml train.csv --validate validation.csv -o rig2.toml"
-
-
-def _warn_in_place(rig: Path, output: Path) -> None:
-    """A word where the rig file that is read is the one to be written: comments do not survive."""
-    if output.exists() and rig.exists() and output.samefile(rig):
-        what = "is the rig file that is read, and is written anew: its own comments and order are "
-        warnings.warn(f"{output}: {what}lost; another name for -o keeps it", stacklevel=2)
 
 
 @app.command(cls=Spread, epilog=example(DIAGNOSE))
@@ -111,7 +109,7 @@ def add(
 
         writable(output, reads=[*fit, *(validate or ())])
         known = load_rig(rig)
-        _warn_in_place(rig, output)
+        warn_in_place(output, rig)
         whole_law = effect == LAW and at is None
         name = "" if whole_law else candidate_name(known.plant, effect, at)
         read, held_out = read_to_fit(known, fit, say), read_all(known, validate, say)
@@ -157,7 +155,7 @@ def improve(
         writable(output, reads=[*train, *(validate or ())])
         writable(json, folders=[report], reads=[rig, *train, *(validate or ())], besides=[output])
         known = load_rig(rig)
-        _warn_in_place(rig, output)
+        warn_in_place(output, rig)
         read, held_out = read_to_fit(known, train, say), read_all(known, validate, say)
         found = improve_rig(known, read, held_out, say, law)
         units = unit_names(known.plant.measured + known.plant.optional_outputs)
@@ -195,7 +193,7 @@ def fit(
 
         writable(output, reads=[*train, *(validate or ())])
         known = load_rig(rig)
-        _warn_in_place(rig, output)
+        warn_in_place(output, rig)
         names = full_names(known.plant, only or ())
         read, held_out = read_to_fit(known, train, say, names), read_all(known, validate, say)
         found = fit_rig(known, read, held_out, only=names, progress=say)
