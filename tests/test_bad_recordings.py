@@ -71,6 +71,15 @@ BAD = {
 }  # fmt: skip
 
 
+def test_a_comma_that_the_rig_does_not_expect_is_told_as_one(tmp_path):
+    """Beside ``an empty cell where nothing was measured`` one would have deleted what is there."""
+    content = text(table()).replace(",", ";").replace(".", ",").replace("_s,", "_s.")
+
+    said = refused(tmp_path, content, 'decimal = "."')
+
+    assert 'is not a number; expected decimal = "," in [recording]' in said
+
+
 @pytest.mark.parametrize("case", BAD)
 def test_bad_files_get_one_clear_message(tmp_path, case):
     change, section, message = BAD[case]

@@ -199,7 +199,7 @@ def test_a_crowd_bars_no_law():
     found = diagnosed("sagging_cable", ("sagging_cable",))
 
     assert found.diagnosis.verdict is Verdict.NOT_IN_CATALOGUE, said([found])
-    assert found.diagnosis.law.balance == "slide.momentum"
+    assert found.diagnosis.law.balances == ("slide.momentum",)
 
 
 def test_the_user_s_rig_lacks_what_is_hidden():

@@ -169,6 +169,19 @@ def test_a_slow_sensor_on_a_fast_clock_has_a_spectrum_of_its_own_samples(step):
     assert residual_of(recording_of(walk), walk, 1.0).outside > 0.9
 
 
+@pytest.mark.parametrize("count", [856, 857])
+def test_gaps_of_two_lengths_in_turn_stop_nothing(count):
+    """No gap is within a sample of the mean of both, and 'compare' ended there."""
+    values = np.full(6_100, np.nan)
+    own = np.cumsum(np.resize([5, 9], count))
+    values[own] = white(count)
+
+    found = residual_of(recording_of(values), values, 1.0)
+
+    assert found.frequency_hz.size == found.density.size
+    assert np.isfinite(found.density).all() and np.isfinite(found.lag_s).all()
+
+
 def test_of_a_sensor_that_recorded_nothing_no_noise_is_told():
     (noise,) = recorded_noise(recording_of(np.full(500, np.nan)), [NAME]).values()
 

@@ -16,6 +16,7 @@ from math import floor
 
 import numpy as np
 
+from workbench.fitting.holes import usual_gap
 from workbench.recording import Recording
 
 LONGEST_LAG_S = 0.1
@@ -119,8 +120,8 @@ def _step(error: np.ndarray) -> float:
 
     One that fits the clock a whole number of times no better comes a sample early or late.
     """
-    apart = np.diff(np.flatnonzero(np.isfinite(error)))
-    usual = np.median(apart) if len(apart) else 1.0
+    there = np.isfinite(error)
+    apart, usual = np.diff(np.flatnonzero(there)), usual_gap(there)
     return float(np.mean(apart[np.abs(apart - usual) <= 1.0])) if usual > 1.0 else 1.0
 
 

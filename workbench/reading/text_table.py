@@ -57,6 +57,8 @@ class _Body:
             expected = f"numbers in {self.time.unit}, or {between}"
         elif "," in cell and self.separator == ",":
             expected = 'decimal or thousands = "," in [recording]'
+        elif "," in cell and COMMA_NUMBER.fullmatch(cell.strip()):
+            expected = 'decimal = "," in [recording]'
         elif timed or kind != NO_NUMBER:
             expected = f"numbers{f' in {self.time.unit}' if timed else ''}"
         what = f"{cell[:SHOWN]!r} in column {column + 1} is {kind}"
