@@ -1,17 +1,20 @@
 """Standard deviations of a fit: how far it would be off on other recordings."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.signal import lsim
 
 from tests.linear_plant import DAMPING_N_S_M, MASS_KG, STIFFNESS_N_M, cart
+from workbench.diagnosis.size import _forms
 from workbench.fitting.gauss_newton import fit_windows
-from workbench.fitting.posterior import both_deviations, posterior_covariance
+from workbench.fitting.posterior import _share_held, both_deviations, posterior_covariance
 from workbench.fitting.unknowns import Unknowns
 from workbench.fitting.windows import cut_windows
 from workbench.recording import Recording
+from workbench.rig import default_rig
 
 SAMPLE_S, LENGTH, WINDOWS = 0.02, 100, 16
 NOISE_M, SCALE_KG = 2e-4, 0.2
@@ -76,3 +79,26 @@ def test_a_deviation_is_told_by_the_errors_of_the_fit_itself(plant):
 
     assert np.ravel(again) == pytest.approx(np.ravel(known), rel=0.05)
     assert posterior_covariance(poor) == pytest.approx(posterior_covariance(found), rel=0.1)
+
+
+def test_a_strength_is_known_better_with_its_forms_held():
+    """As the variance of one normal variable where others are known: S_aa - S_ab S_bb^-1 S_ba."""
+    root = np.random.default_rng(4).standard_normal((9, 4))
+    hessian = root.T @ root
+    S = np.linalg.inv(hessian)
+    a, b = 1, [0, 3]
+    held = S[a, a] - S[a, b] @ np.linalg.solve(S[np.ix_(b, b)], S[b, a])
+
+    assert _share_held(hessian, S, a, b) == pytest.approx(np.sqrt(held / S[a, a]))
+    assert _share_held(hessian, S, a, []) == pytest.approx(1.0)
+
+
+def test_the_forms_that_are_held_are_those_that_were_fitted_with_a_strength():
+    plant = default_rig("servo_drive").plant
+    strength = "friction.position_share"
+    length, phase = "friction.wavelength_m", "friction.phase_rad"
+    unknowns = SimpleNamespace(names=(strength, phase, "slide.mass_kg"))
+    fit = SimpleNamespace(unknowns=unknowns, windows=SimpleNamespace(plant=plant))
+
+    assert _forms(fit, (strength, length, phase)) == {strength: [phase]}
+    assert _forms(fit, (phase, "slide.mass_kg")) == {}

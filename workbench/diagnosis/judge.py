@@ -12,8 +12,8 @@ the criterion.  A candidate is accepted when
 3. at least 20 % of the misfit beyond noise goes away, as the mean over training and held-out
    recordings and with no less than 10 % in training: less may stand for something else,
 4. its size is inside its bounds, more than 3 % of typical, and more than two standard deviations
-   from none, as the curvature of the cost tells these; of a parameter that is there already, from
-   what is believed of it.
+   from none, as the curvature of the cost tells these with its forms held; of a parameter that is
+   there already, from what is believed of it.
 
 A pair pays for the parameters of both, takes twice the share, and both sizes must be sound.
 """

@@ -15,7 +15,8 @@ DISTINCT = 2.0  # standard deviations
 class Size:
     """A fitted strength or form in SI, with its standard deviation.
 
-    ``curvature`` is what the curvature of the cost alone tells of that; NaN where it is not asked.
+    ``curvature`` is what the curvature of the cost alone tells of that, of a strength with its
+    forms as they are; NaN where it is not asked.
     """
 
     value: float
@@ -25,7 +26,7 @@ class Size:
 
 def sizes(fit: Fit, names: tuple[str, ...]) -> dict[str, Size]:
     """Values and posterior standard deviations of fitted parameters."""
-    told, curvature = both_deviations(fit)
+    told, curvature = both_deviations(fit, _forms(fit, names))
     values = fit.unknowns.values(fit.point.t)
     index = {name: k for k, name in enumerate(fit.unknowns.names)}
     return {
@@ -33,6 +34,17 @@ def sizes(fit: Fit, names: tuple[str, ...]) -> dict[str, Size]:
         for n in names
         if n in index
     }
+
+
+def _forms(fit: Fit, names: tuple[str, ...]) -> dict[str, list[str]]:
+    """The fitted forms of each of the names that is a strength."""
+    fitted = fit.unknowns.names
+    found = {
+        each.strength: [form for form in each.forms if form in fitted]
+        for each in fit.windows.plant.candidates.values()
+        if each.strength in names and each.strength in fitted
+    }
+    return {strength: forms for strength, forms in found.items() if forms}
 
 
 def distinct(size: Size, null: float = 0.0) -> bool:

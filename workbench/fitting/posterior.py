@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf, isnan, nan
+from types import MappingProxyType
 
 import numpy as np
 
@@ -52,7 +53,9 @@ def posterior_deviation(fit: Fit) -> np.ndarray:
     return both_deviations(fit)[0]
 
 
-def both_deviations(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
+def both_deviations(
+    fit: Fit, shaped_by: Mapping[str, Sequence[str]] = MappingProxyType({})
+) -> tuple[np.ndarray, np.ndarray]:
     """Standard deviations of the unknowns: those that are told, and the curvature's, each (n_p,).
 
     The curvature of the cost tells them by H^-1, where errors are as the scales tell them: these
@@ -65,8 +68,13 @@ def both_deviations(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
     of the two is told, and no more than the prior.  What all windows have wrong alike neither
     tells.  One that the fit holds at a bound has none, NaN.
 
+    The curvature's deviation of a strength is that with the forms held that it is ``shaped_by``:
+    where the strength is none no form can be known, so one that is hardly known says nothing of
+    whether the strength is there.
+
     Source: White 1982, "Maximum likelihood estimation of misspecified models"; in groups of errors
-    that go together, Liang and Zeger 1986.
+    that go together, Liang and Zeger 1986; of forms, Davies 1977 and 1987, "Hypothesis testing when
+    a nuisance parameter is present only under the alternative".
     """
     scale, prior = fit.unknowns.scale, fit.unknowns.precision
     if not len(fit.unknowns):
@@ -77,7 +85,18 @@ def both_deviations(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
     known = np.where(normal.precision > 0.0, known, np.nan)
     most = np.fmax(1.0 / np.sqrt(np.maximum(prior, 1e-300)), known)
     told = np.clip(np.sqrt(np.diag(inverse @ _pulls(normal) @ inverse)), known, most)
+    for name, forms in shaped_by.items():
+        k = fit.unknowns.names.index(name)
+        known[k] *= _share_held(normal.hessian, inverse, k, [*map(fit.unknowns.names.index, forms)])
     return told * scale, known * scale
+
+
+def _share_held(hessian: np.ndarray, inverse: np.ndarray, k: int, forms: list[int]) -> float:
+    """The deviation of one unknown with others held, over that with them free."""
+    left = [row for row in range(len(hessian)) if row not in forms]
+    held = np.linalg.inv(hessian[np.ix_(left, left)])
+    place = left.index(k)
+    return float(np.sqrt(held[place, place] / inverse[k, k]))
 
 
 def _pulls(normal: Normal) -> np.ndarray:
