@@ -13,6 +13,7 @@ from studies.text_of_results import diagnosis_text, moved_text
 from workbench.diagnosis.judge import HELD_OUT_REASON, SHARE_REASON
 from workbench.diagnosis.result import Verdict
 from workbench.diagnosis.verdict import BLIND_SHOWN, unexplained, worsened
+from workbench.diagnosis.warned import Of, Warned
 from workbench.fitting.errors import SignalError
 from workbench.fitting.posterior import Moved
 
@@ -103,6 +104,7 @@ def test_a_no_beside_large_errors_names_what_the_recording_could_not_show():
     (plain,) = map(str, unexplained(FAR, Verdict.NOTHING_MISSING, [seen]))
     assert plain.endswith(FAR[0])
     assert unexplained(FAR, Verdict.FOUND, blind) == ()
+    assert unexplained(FAR, Verdict.SMALL_PROXY, [seen]) == (Warned(plain, Of.ERRORS_LEFT),)
     assert unexplained((), Verdict.NOTHING_MISSING, blind) == ()
 
 

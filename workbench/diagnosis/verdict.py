@@ -99,11 +99,11 @@ def unsteady(
 def unexplained(
     far: Sequence[str], verdict: Verdict, ranking: Sequence[Ranked]
 ) -> tuple[Warned, ...]:
-    """A warning where nothing is named and the error stays far above the noise all the same.
+    """A warning where no more than a proxy is named and the error stays far above the noise.
 
     What the recording could not show is told then: it is not to be taken for absent.
     """
-    if not far or verdict in NAMING or verdict is Verdict.NOT_IN_CATALOGUE:
+    if not far or verdict in (Verdict.FOUND, Verdict.TIE, Verdict.NOT_IN_CATALOGUE):
         return ()
     told = f"unexplained errors remain on held-out windows: {', '.join(far)}"
     if verdict is not Verdict.RECORDING_TOO_WEAK and any(row.blind for row in ranking):
