@@ -4,11 +4,24 @@ import time
 from dataclasses import dataclass, replace
 
 import casadi as ca
+import numpy as np
 import pytest
 from conftest import PLANT_MODELS
 
 from workbench import cause_checks, plant_checks, plant_numbers
-from workbench.effect import Effect, Force, HeatFlow, MassFlow, Part, Term, form, strength
+from workbench.effect import (
+    Balance,
+    Cause,
+    Effect,
+    Force,
+    HeatFlow,
+    MassFlow,
+    Part,
+    State,
+    Term,
+    form,
+    strength,
+)
 from workbench.effects import FivePortValve, SensorLag, SupplyDroop
 from workbench.errors import InputError
 from workbench.parts import Atmosphere, Body, Chamber, Supply
@@ -197,3 +210,91 @@ def test_a_number_that_cannot_be_is_put_down_to_a_users_own_member():
     )
     with pytest.raises(InputError, match=r"^wind.speed_m_s is nan at the start"):
         check_plant(plant)
+
+
+WORDS = dict(balance=Balance.MOMENTUM, drivers=(), shown_by="", source="")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Own(Effect):
+    """An effect of a user's own, that does what a test says."""
+
+    causes = (
+        Cause(name="size", strength="size", forms=("less",), **WORDS),
+        Cause(name="less", strength="less", needs="size", **WORDS),
+    )
+    size: float = strength(typical=1.0)
+    less: float = strength(typical=0.5)
+    trim: float = strength(typical=0.0, lower=-1.0, upper=1.0)  # of no cause
+    signal: str | None = None
+    signals: tuple[str, ...] = ()
+    forces: object = None  # of the effect and the position, what it puts into the slide
+    shift: object = None  # of the effect and a signal, what comes of the signal
+    sample: object = None  # of the effect and a sequence, what comes of the sequence
+
+    def terms(self, now):
+        x_m = now["slide"].position_m
+        return [Force("slide", f) for f in (self.forces(self, x_m) if self.forces else ())]
+
+    def alter(self, signal, value, now):
+        mine = signal.startswith(self.signal or "slide.position") or signal in self.signals
+        return self.shift(self, value) if self.shift and mine else value
+
+    def resample(self, channel, values, sample_time_s):
+        return self.sample(self, values) if self.sample else values
+
+
+@dataclass(frozen=True, kw_only=True)
+class Regulated(Part):
+    def states(self):
+        yield from (State("pressure_pa", 7e5, 1e5), State("position_m", 0.1, 0.1))
+
+    def derive(self, now):
+        return {"temperature_k": 293.0, "text": "x", "none": None, "vector": ca.SX([1, 2])}
+
+    def rates(self, now, received):
+        own = now[self.name]
+        return {"pressure_pa": 6e5 - own.pressure_pa, "position_m": 0.2 - own.position_m}
+
+
+def slide(*effects, parts=()):
+    parts = (Body(name="slide"), *parts)
+    return Plant(name="mine", parts=parts, effects=effects, measured=("slide.position_m",))
+
+
+@pytest.mark.parametrize(
+    "own",
+    [
+        dict(forces=lambda e, x_m: [-e.size / x_m**2]),
+        dict(forces=lambda e, x_m: [ca.if_else(e.size > 0, 1 / e.size, 0.0)]),
+        dict(forces=lambda e, x_m: [ca.if_else(e.less > 0, e.size / ca.log(e.less / e.size), 0)]),
+        dict(shift=lambda e, value: value + ca.if_else(e.size > 0, 1 / e.size, 0)),
+        dict(shift=lambda e, value: 0.3 * ca.sin(ca.asin(value / 0.3) + e.size)),
+        dict(forces=lambda e, x_m: [x_m / 1.1 * (1 - e.size) ** 1.7, -x_m / 1.1]),
+        dict(forces=lambda e, x_m: [9.81 * (ca.sin(0.3 + e.size) - 0.3 + 0.3 - ca.sin(0.3))]),
+        dict(sample=lambda e, values: [1.0 / e.size]),
+        dict(sample=lambda e, values: np.convolve(values, np.eye(1, 999)[0])[: len(values)]),
+        dict(signal="slide.pos", shift=lambda e, value: value + e.size),
+        dict(signal="slide.velocity_m_s", shift=lambda e, value: value + e.size),
+        dict(signals=("slide.position_m", "b.position_m"), shift=lambda e, value: value + e.size),
+    ],
+    ids=lambda own: next(iter(own)),
+)
+def test_what_only_looks_like_wrong_passes(own):
+    """Singular at the start or at null, guarded, rounded, or of signals in a sense of its own."""
+    check_plant(slide(Own(name="own", **own)))
+
+
+def test_a_part_that_goes_its_own_way_takes_what_comes():
+    @dataclass(frozen=True, kw_only=True)
+    class Pull(Effect):
+        def terms(self, now):
+            yield from (Force("slide", 1.0), Force("other", -1.0), MassFlow("other", 1e-3, 293.0))
+
+    check_plant(slide(Pull(name="pull"), parts=(Regulated(name="other"),)))
+
+
+def test_what_is_left_at_null_is_no_rounding_where_it_is_a_share_of_what_it_does():
+    faulty = Own(name="own", forces=lambda e, x_m: [x_m * (1.0 - e.size), -0.999999 * x_m])
+    with pytest.raises(InputError, match=r"own puts a Force of -?\S+e-0\d N into slide with all"):
+        check_plant(slide(faulty))

@@ -49,11 +49,11 @@ def test_stops_that_count_from_the_middle_need_chambers_that_do_too():
 
 @pytest.mark.parametrize("keys", [("chamber_a.stroke",), ("chamber_b.stroke",), tuple(SHORT)])
 def test_a_shorter_stroke_needs_stops_that_are_nearer_too(keys):
-    values = {key: "200 mm" for key in keys}
+    values = {key: "150 mm" for key in keys}
     message = refused(rig(values))
 
     assert message.name == keys[0] and message.line == 4
-    assert "stops reach from 0 mm to 290 mm" in message.what and "0 mm to 200 mm" in message.what
+    assert "stops reach from 0 mm to 290 mm" in message.what and "0 mm to 150 mm" in message.what
     assert load_rig(rig(SHORT | {"stops.upper": "200 mm"}))
 
 
@@ -67,7 +67,27 @@ def test_the_lower_stop_is_below_the_upper_one():
 def test_stops_may_hold_a_body_back_and_give_way_a_little():
     for upper in ("150 mm", "290.9 mm", "292 mm"):
         assert load_rig(rig({"stops.upper": upper}))
-    assert refused(rig({"stops.upper": "294 mm"}))
+
+
+@pytest.mark.parametrize("ends", [(0, 294), (-5, 285), (-55, 290), (0, 340)])
+def test_stops_may_lie_within_the_dead_volume(ends):
+    """There the volumes are right: those of the drive are 63 mm and 113 mm long."""
+    lower, upper = (f"{end} mm" for end in ends)
+
+    assert load_rig(rig({"stops.lower": lower, "stops.upper": upper}))
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"stops.upper": "360 mm"},
+        {"stops.lower": "-62 mm"},
+        {"stops.lower": "-30 mm", "chamber_a.dead_volume_change": "-0.6"},
+        {"stops.lower": "-30 mm", "chamber_a.dead_volume": "10 cm^3"},
+    ],
+)
+def test_stops_may_not_lie_where_the_volume_no_longer_shrinks(values):
+    assert refused(rig(values))
 
 
 def test_every_place_is_looked_at_and_complaints_come_together():

@@ -17,6 +17,7 @@ ALTER = """    def alter(self, signal, value, now):
         return value + 0.5 if signal == "motor.force_n" else value
 
 """
+SIGNAL = '    signal: str = "motr.force_n"\n\n'
 LAG = """    def states(self):
         yield State("lag_m", 0.0, 1.0)
 
@@ -90,9 +91,9 @@ CASES = {
         "nothing, or a property absent that says False",
     ),
     "an alter of no signal": (
-        [(ANGLE, ALTER.replace("motor", "motr") + ANGLE)],
-        "cogging has an alter() that changes no signal of the plant; expected one that changes "
-        "one of motor.force_n, slide.position_m, slide.moving_mass_kg",
+        [(ANGLE, SIGNAL + ALTER.replace('"motor.force_n"', "self.signal") + ANGLE)],
+        "cogging acts on motr.force_n, which is no signal of the plant; expected one of "
+        "motor.force_n, slide.position_m, slide.moving_mass_kg; did you mean 'motor.force_n'?",
     ),
     "a strength that is no field": (
         [('strength="amplitude_n"', 'strength="amplitude"')],
@@ -112,7 +113,7 @@ CASES = {
     "a form that is no field": (
         [('strength="amplitude_n"', 'strength="amplitude_n", forms=("pich_m",)')],
         "Cogging, cause cogging: its form is 'pich_m', and there is no such field; expected a "
-        "field made by form(): pitch_m; did you mean 'pitch_m'?",
+        "field made by strength() or form(): amplitude_n, pitch_m; did you mean 'pitch_m'?",
     ),
     "a typical size of nothing": (
         [("typical=10.0", "typical=0.0")],

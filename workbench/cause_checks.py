@@ -34,8 +34,6 @@ def _faults(member: Effect) -> Iterator[Message]:
         what = f"{kind} is no dataclass, so its {listed(bare)} cannot be set"
         yield Message(what, expected="@dataclass(frozen=True, kw_only=True) above the class")
         return
-    for key, known in member.parameters().items():
-        yield from _parameter_faults(f"{kind}.{key}", known)
     causes = member.causes
     if not _list_of(causes, Cause):
         expected = "a tuple of Cause, with a comma behind a single one"
@@ -64,9 +62,14 @@ def _cause_faults(member: Effect, cause: Cause, where: str) -> Iterator[Message]
             kind = "texts" if each is str else "numbers"
             yield Message(what, expected=f"a tuple of {kind}, with a comma behind a single one")
             return
+    forms = (*cause.forms, *cause.shapes)
+    for key, known in member.parameters().items():
+        if key in (cause.strength, *forms, cause.held, cause.needs):
+            yield from _parameter_faults(f"{type(member).__name__}.{key}", known)
     yield from _field_faults(member, where, "strength", cause.strength, STRENGTH)
-    for key in (*cause.forms, *cause.shapes):
-        yield from _field_faults(member, where, "form", key, FORM)
+    for key in forms:
+        by = FORM if key == cause.strength else EITHER
+        yield from _field_faults(member, where, "form", key, by)
     if cause.held is not None:
         yield from _field_faults(member, where, "held field", cause.held, EITHER)
     if cause.needs is not None:

@@ -1,8 +1,9 @@
 """Whether stops and chambers of one body, as a rig file gives them, are of one stroke.
 
-Beyond the stroke of a chamber its volume would be less than its dead volume, and soon nothing: the
-model keeps a little there, which no longer shrinks, and a search takes that for another dead
-volume.  Chambers that two bodies close are left out, as both ends of neither say what is left.
+Beyond the stroke of a chamber the dead volume is left, and soon nothing: the model keeps a tenth of
+it there, which no longer shrinks, and a search takes that for another dead volume.  Stops may lie
+within the rest of it.  Chambers that two bodies close are left out, as both ends of neither say
+what is left.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
 ENDS = ("lower_m", "upper_m", "stroke_m", "rest_m")  # fields that say where a stroke is
 SLACK_M, SLACK = 1e-3, 0.01  # of the stroke: stops give way, and lengths are read off
+USABLE = 0.9  # of the dead volume: the model keeps the rest of it, however far a body goes
 DEVIATIONS = 3.0  # that a fit may have moved what is uncertain
 
 
@@ -72,15 +74,15 @@ def _chambers(plant: Plant, body: str) -> list[Chamber]:
 
 
 def _sticks_out(rig: Rig, stops: EndStops, chamber: Chamber) -> bool:
-    """Whether stops let a body out of a chamber, beyond what nobody may have meant."""
+    """Whether stops let a body out of a chamber, to where its volume no longer shrinks."""
     begin_m, stroke_m = float(chamber.lower_m), float(chamber.stroke_m)
     out_m = max(begin_m - float(stops.lower_m), float(stops.upper_m) - begin_m - stroke_m)
     slack_m = max(SLACK_M, SLACK * stroke_m)
     names = (*_names(stops), *_names(chamber))
     uncertain_m = hypot(*(rig.standard_deviation(name) for name in names))
-    if uncertain_m:  # a fit may move it as far as there is gas, and writes what it is sure of then
-        slack_m += DEVIATIONS * uncertain_m + float(chamber.dead_volume_m3 / chamber.area_m2)
-    return out_m > slack_m
+    dead_m3 = float(chamber.dead_volume_m3 * (1.0 + chamber.dead_volume_change))
+    gas_m = USABLE * dead_m3 / float(chamber.area_m2)
+    return out_m > slack_m + gas_m + DEVIATIONS * uncertain_m
 
 
 def _together(plant: Plant, stops: EndStops) -> str:

@@ -218,7 +218,7 @@ class Chamber(GasVolume):
         body = now[self.body]
         positions_m = (now[name].position_m for name in self.bodies)
         dead_m3 = self.dead_volume_m3 * (1.0 + self.dead_volume_change)
-        # Only solvers come far beyond the stroke: a rig whose stops let a body go there is refused.
+        # Only solvers come this far: geometry.py refuses stops that let a body go there.
         volume_m3 = ca.fmax(self.volume_m3(*positions_m), 0.1 * dead_m3)
         length_m = self.length_m(body.position_m)
         around_m = pi * ca.sqrt(4.0 / pi * self.area_m2)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import casadi as ca
 
@@ -18,8 +17,17 @@ from workbench.effect import AddedMass, Effect, Force, HeatFlow, MassFlow, Term,
 from workbench.effects.timing import Timing
 from workbench.errors import InputError, Message, listed, nearest
 from workbench.model import Model
+from workbench.parts import Atmosphere, Supply
 from workbench.plant import Plant
-from workbench.plant_numbers import altered, derived, not_absent, not_numbers
+from workbench.plant_numbers import (
+    altered,
+    derived,
+    is_number,
+    not_absent,
+    not_numbers,
+    with_symbols,
+)
+from workbench.units import suffix
 
 # By kind of flow what of a member it moves.  Where nothing does, as with the pressure of a supply,
 # the flow goes to where there is enough, and nobody counts it.
@@ -77,14 +85,14 @@ def lost_flows(plant: Plant) -> list[Message]:
     model = plant.model
     put = {
         (member.name, type(term), term.balance): term
-        for member in plant.members
+        for member in with_symbols(plant).members
         for term in member.terms(model.conditions)
     }
     taken = _taken(plant, list(put.values()))
     return [
         _lost(model, source, kind, balance, taken[kind])
         for source, kind, balance in put
-        if balance not in taken[kind] and not _unmoved(model, kind, balance)
+        if balance not in taken[kind] and not _unmoved(plant, kind, balance)
     ]
 
 
@@ -99,7 +107,7 @@ def _taken(plant: Plant, terms: list[Term]) -> Mapping[type[Term], list[str]]:
         for (kind, balance), size in zip(asked, sizes, strict=True)
     )
     model = plant.with_effects(Probe(name="probe", flows=tuple(flows))).model
-    inside = (value for _, value in model.conditions.named())
+    inside = (value for _, value in model.conditions.named() if is_number(value))
     everything = ca.vertcat(model.rates, model.outputs, *inside)
     taken: dict[type[Term], list[str]] = {kind: [] for kind in kinds}
     for k in sorted({*ca.jacobian_sparsity(everything, ca.vertcat(*sizes)).get_col()}):
@@ -108,12 +116,20 @@ def _taken(plant: Plant, terms: list[Term]) -> Mapping[type[Term], list[str]]:
     return taken
 
 
-def _unmoved(model: Model, kind: type[Term], balance: str) -> bool:
-    """True where what a flow would move is there, and no state has a part in it."""
+def _unmoved(plant: Plant, kind: type[Term], balance: str) -> bool:
+    """True where what a flow would move is there, and goes its own way.
+
+    So do a supply, a recording, and what a user's own part or effect says of it.
+    """
     quantity = next((moved for each, moved in MOVED.items() if issubclass(kind, each)), "")
-    value = dict(model.conditions.named()).get(f"{balance}.{quantity}")
-    x = model.symbols[0]
-    return value is not None and not (x.numel() and ca.depends_on(ca.SX(value), x))
+    value = dict(plant.model.conditions.named()).get(f"{balance}.{quantity}")
+    if value is None or not is_number(value):
+        return False
+    for member in plant.members:
+        if member.name == balance and (own(member) or isinstance(member, Supply | Atmosphere)):
+            return True
+    x = plant.model.symbols[0]
+    return not (x.numel() and ca.depends_on(ca.SX(value), x))
 
 
 def _lost(model: Model, source: str, kind: type[Term], balance: str, taken: list[str]) -> Message:
@@ -133,32 +149,38 @@ def lost_signals(plant: Plant) -> Iterator[Message]:
     for member in plant.members:
         late = isinstance(member, Timing)  # that acts on what is recorded, not on what is inside
         known = list(dict.fromkeys((*sent, *outputs, *(() if late else inside))))
-        named = _signals_of(member)
-        for name in (name for name in named if name not in known):
+        lost = [name for name in _signals_of(member) if name not in known]
+        if lost and own(member) and _meant(plant, member, known):
+            continue
+        for name in lost:
             what = f"{member.name} acts on {name}, which is no signal of the plant"
             yield Message(what, "", f"one of {listed(known)}", nearest(name, known))
-        if own(member) and _alters(member) and not named and not _altering(plant, member, known):
-            what = f"{member.name} has an alter() that changes no signal of the plant"
-            yield Message(what, "", f"one that changes one of {listed(known)}")
 
 
 def _signals_of(member: Effect) -> list[str]:
-    """Names of the signals that a member acts on, as the effects of the catalogue say them."""
-    if not (_alters(member) or isinstance(member, Timing)):
+    """Names of the signals that a member acts on, as the effects of the catalogue say them.
+
+    Of a user's own only a single one: several may be a choice, of which not all are there.
+    """
+    if type(member).alter is Effect.alter and not isinstance(member, Timing):
         return []
     one, several = getattr(member, "signal", None), getattr(member, "signals", ())
-    several = several if isinstance(several, tuple | list) else ()
+    several = several if isinstance(several, tuple | list) and not own(member) else ()
     return [name for name in (one, *several) if isinstance(name, str)]
 
 
-def _alters(member: Effect) -> bool:
-    return type(member).alter is not Effect.alter
+def _meant(plant: Plant, member: Effect, known: list[str]) -> bool:
+    """Whether a user's own effect may well mean a name that is no signal of the plant.
 
-
-def _altering(plant: Plant, member: Effect, known: list[str]) -> bool:
-    """Whether a member changes any of these signals with its strengths at their typical sizes."""
-    strengths: dict[str, Any] = {
-        k: v.typical for k, v in member.parameters().items() if v.null is not None
-    }
-    present = replace(member, **strengths)
-    return any(name in known for name, _ in altered(plant.model, present))
+    It does where the name is no full one, a prefix say, where it is a quantity that passes by
+    unaltered here, and where the effect alters some signal all the same.
+    """
+    name = str(getattr(member, "signal", ""))
+    there = any(name == quantity for quantity, _ in plant.model.conditions.named())
+    changed = (
+        n
+        for each in with_symbols(plant).members
+        if each.name == member.name
+        for n, _ in altered(plant.model, each)
+    )
+    return not suffix(name) or there or any(n in known for n in changed)
