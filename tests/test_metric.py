@@ -7,6 +7,7 @@ import pytest
 from test_fitting import NOISE, sines
 
 from workbench.diagnosis.metric import Metric
+from workbench.diagnosis.scan import _single
 from workbench.diagnosis.shifts import shifts
 from workbench.diagnosis.ties import imitation
 from workbench.fitting.linearised import Normal, normal_equations
@@ -94,3 +95,13 @@ def test_a_shift_says_how_far_the_cost_falls_where_its_prior_is_taken_away():
 
     assert abs(t[k]) > 1.0
     assert found["slide.mass_kg"].drop * problem.misfit == pytest.approx(fall, rel=0.05)
+
+
+def test_a_change_that_runs_away_stays_a_number_and_so_does_its_square():
+    """In single precision it was infinite, with a warning on the screen."""
+    change = np.array([[1.0, -2.5], [1e80, -1e200]])
+    row = _single(change)
+
+    assert row.dtype == np.float32 and row.shape == (4,)
+    assert row[:2] == pytest.approx([1.0, -2.5])
+    assert np.isfinite(np.sum(row**2))

@@ -39,6 +39,7 @@ from workbench.plant import Plant
 
 WIDER = 3.0  # times as wide: the priors of the second look (diagnosis.md 2: 5 % and 15 %)
 FEWEST_FROM_PRIORS = 12  # windows that a scan from the priors looks at
+LARGEST = 1e15  # deviations: a change beyond runs away, and its square is to stay a number
 
 
 @dataclass(frozen=True)
@@ -214,13 +215,18 @@ def _profiles(
         pairs.sort(key=lambda pair: -pair[0].drop)
         best, row = pairs[0]
         signature, share = metric.signature(as_it_is - row)
-        changes = np.array([(row - as_it_is).ravel() for _, row in pairs], dtype=np.float32)
+        changes = np.array([_single(row - as_it_is) for _, row in pairs])
         trials = tuple(trial for trial, _ in pairs)
         drop_wide = of_all * max(wide.cost - wide.explained(row)[0] for _, row in pairs)
         profiles.append(
             Profile(best.candidate, trials, signature, share, changes, max(drop_wide, 0.0))
         )
     return profiles
+
+
+def _single(change: np.ndarray) -> np.ndarray:
+    """A change of the residuals as one row in single precision, of a plant that runs away too."""
+    return np.clip(change, -LARGEST, LARGEST).ravel().astype(np.float32)
 
 
 def _groups(
