@@ -25,7 +25,13 @@ from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.holes import long_holes
 from workbench.fitting.noise import NoNoiseError, measured_noise
 from workbench.fitting.starts import sensed_states
-from workbench.fitting.window_cuts import begun_s, cut_rows, received_windows, window_firsts
+from workbench.fitting.window_cuts import (
+    begun_s,
+    cut_rows,
+    received_windows,
+    variances,
+    window_firsts,
+)
 from workbench.fitting.window_length import window_length_s
 from workbench.fitting.window_runs import WindowRuns
 from workbench.fitting.windows import Windows
@@ -55,7 +61,7 @@ def probe(plant: Plant, recording: Recording) -> Probe | None:
     firsts = tuple(k for k in window_firsts(recording, length) if not blind[k : k + length].any())
     if not firsts:
         return None
-    spread = np.sqrt(_variances(cut_rows(recording.rows(plant.measured), firsts, length)))
+    spread = np.sqrt(variances(cut_rows(recording.rows(plant.measured), firsts, length)))
     lively = (spread / np.maximum(spread.max(axis=1, keepdims=True), 1e-300)).sum(axis=0)
     chosen = np.sort(np.argsort(-lively, kind="stable")[:MOST_PROBED])
     return Probe(tuple(firsts[k] for k in chosen), length)
@@ -64,16 +70,8 @@ def probe(plant: Plant, recording: Recording) -> Probe | None:
 def moving(plant: Plant, recording: Recording, where: Probe) -> np.ndarray:
     """Which outputs move in the windows beyond their noise, (n_y,)."""
     cut = cut_rows(recording.rows(plant.measured), where.firsts, where.length)
-    size = np.sqrt(_variances(cut).mean(axis=1))
-    return size > ACTIVE * np.array([_noise(recording, name) for name in plant.measured])
-
-
-def _variances(cut: np.ndarray) -> np.ndarray:
-    """Variance of what was recorded in each window, 0 without any, (n_y, n_windows)."""
-    seen = np.isfinite(cut)
-    count = np.maximum(seen.sum(axis=2), 1)
-    mean = np.where(seen, cut, 0.0).sum(axis=2) / count
-    return (np.where(seen, cut - mean[:, :, None], 0.0) ** 2).sum(axis=2) / count
+    size = np.sqrt(variances(cut).mean(axis=1))
+    return size > ACTIVE * np.array([shown_noise(recording, name) for name in plant.measured])
 
 
 def unexplained(plant: Plant, readings: Sequence[Recording], where: Probe) -> np.ndarray:
@@ -152,7 +150,7 @@ def _ratio(error: np.ndarray, measured: np.ndarray, stateless: bool) -> np.ndarr
     return np.where(lost, WORST, np.minimum(found, WORST))
 
 
-def _noise(recording: Recording, channel: str) -> float:
+def shown_noise(recording: Recording, channel: str) -> float:
     """Noise of a channel, 0 where it shows none."""
     try:
         return measured_noise([recording], [channel])[channel]

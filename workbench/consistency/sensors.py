@@ -18,10 +18,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from workbench.consistency.explained import Probe, predicted_motion, probe
+from workbench.consistency.explained import Probe, predicted_motion, probe, shown_noise
 from workbench.consistency.findings import Finding, Weight
 from workbench.effects.forces import EndStops
-from workbench.fitting.noise import THIRD_DIFFERENCE_GAIN, NoNoiseError, measured_noise
+from workbench.fitting.noise import THIRD_DIFFERENCE_GAIN
 from workbench.fitting.window_cuts import evenly
 from workbench.plant import Plant
 from workbench.reading.outliers import outliers
@@ -230,18 +230,8 @@ def _should_move(plant: Plant, recording: Recording, name: str, stretch: tuple[i
         return False
     chosen = tuple(firsts[k] for k in evenly(len(firsts), min(LOOKED_AT, len(firsts))))
     motion = predicted_motion(plant, recording, Probe(chosen, size))
-    usual = _noise(recording, name)
-    if usual is None:
-        usual = SOLVED * float(np.nanmax(np.abs(recording[name])))
+    usual = shown_noise(recording, name) or SOLVED * float(np.nanmax(np.abs(recording[name])))
     return bool(np.median(motion[plant.measured.index(name)]) > CLEARLY * usual)
-
-
-def _noise(recording: Recording, name: str) -> float | None:
-    """Noise of a channel in SI; None where it shows none, as where it is constant."""
-    try:
-        return measured_noise([recording], [name])[name]
-    except NoNoiseError:
-        return None
 
 
 def uneven_clock(plant: Plant, recording: Recording) -> list[Finding]:
@@ -270,8 +260,8 @@ def _jitter(recording: Recording, name: str) -> tuple[float, float]:
         values = recording[name].copy()
         values[first : first + length] = np.nan
         recording = replace(recording, channels={**recording.channels, name: values})
-    noise = _noise(replace(recording, noise={}), name)
-    if noise is None:
+    noise = shown_noise(replace(recording, noise={}), name)
+    if not noise:
         return 0.0, np.inf
     third, slope = [], []
     for piece in recording.pieces:

@@ -49,6 +49,14 @@ def cut_rows(rows: np.ndarray, firsts: tuple[int, ...], length: int) -> np.ndarr
     )
 
 
+def variances(cut: np.ndarray) -> np.ndarray:
+    """Variance of what was recorded in each window, 0 without any, (n_y, n_windows)."""
+    seen = np.isfinite(cut)
+    count = np.maximum(seen.sum(axis=2), 1)
+    mean = np.where(seen, cut, 0.0).sum(axis=2) / count
+    return (np.where(seen, cut - mean[:, :, None], 0.0) ** 2).sum(axis=2) / count
+
+
 def in_time(effect: Effect) -> bool:
     """True for a cause that acts on the sampled commands: delay, pause."""
     return type(effect).resample is not Effect.resample

@@ -28,6 +28,7 @@ from workbench.fitting.window_cuts import (
     in_time,
     received_windows,
     thinned,
+    variances,
     window_firsts,
     window_starts,
 )
@@ -122,12 +123,7 @@ class Windows:
         The same for all windows where positions alone are recorded: there is no quiet pressure in
         which a leak would show, and slow creeping is not to be weighed above full strokes.
         """
-        recorded = np.isfinite(self.measured)
-        count = np.maximum(recorded.sum(axis=2), 1)
-        values = np.where(recorded, self.measured, 0.0)
-        mean = values.sum(axis=2) / count
-        spread = np.where(recorded, self.measured - mean[:, :, None], 0.0)
-        variance = (spread**2).sum(axis=2) / count
+        variance = variances(self.measured)
         if position_alone(self.plant):
             variance = np.broadcast_to(variance.mean(axis=1, keepdims=True), variance.shape)
         return np.sqrt(np.maximum(variance - self.noise[:, None] ** 2, 0.0))
