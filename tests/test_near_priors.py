@@ -49,7 +49,8 @@ def test_it_is_the_least_of_a_likelihood_to_a_power_far_below_one(problem, sound
     r0, J = fit.derivatives.residual.ravel(), fit.derivatives.parameters.reshape(-1, 2)
     r0 = r0 - J @ fit.point.t
     known = fit.unknowns.precision >= 1.0
-    weights = np.sqrt(np.where(known, fit.unknowns.precision / POWER, fit.unknowns.precision))
+    power = POWER / UNSURE**2  # as wide as the catalogue's
+    weights = np.sqrt(np.where(known, fit.unknowns.precision / power, fit.unknowns.precision))
     t = np.linalg.lstsq(np.vstack([J, np.diag(weights)]), np.r_[-r0, 0.0, 0.0], rcond=None)[0]
     training = np.sum((r0 + J @ t) ** 2) + np.sum((weights * t) ** 2)
     held_out = problem.validated(replace(fit, point=replace(fit.point, t=t)))
@@ -87,6 +88,43 @@ def test_what_was_added_and_what_is_always_there_is_held_no_closer():
 
     assert ratio[leak.strength] == ratio["command_delay.delay_s"] == 1.0
     assert ratio["slide.mass_kg"] == pytest.approx(100.0)
+
+
+@pytest.mark.parametrize("factor", [0.3, 3.0])
+def test_how_sure_a_user_is_of_all_parameters_alike_orders_nothing(factor):
+    """They are held in the same places then; what one is surer of than the rest stays that."""
+    rig = default_rig("servo_drive")
+    own = believed(rig)
+    own["slide.mass_kg"] *= 0.5
+    wide = {name: factor * deviation for name, deviation in own.items()}
+    held = [held_to(rig, deviations) for deviations in (own, wide)]
+
+    assert held[0] == pytest.approx(held[1])
+    usual = held_to(rig, {})
+    assert held[1]["slide.mass_kg"] == pytest.approx(0.5 * usual["slide.mass_kg"])
+    assert held[1]["friction.viscous_n_s_m"] == pytest.approx(usual["friction.viscous_n_s_m"])
+
+
+def test_nothing_is_held_less_than_the_rig_does():
+    rig = default_rig("servo_drive")
+    sure = {name: 0.01 * deviation for name, deviation in believed(rig).items()}
+
+    assert held_to(rig, sure) == pytest.approx(sure)
+
+
+def believed(rig):
+    """Standard deviations of all that is uncertain, without what is tolerated in every fit."""
+    names = nominal_unknowns(rig.plant).names
+    known = {name: rig.standard_deviation(name) for name in names}
+    return {name: deviation for name, deviation in known.items() if deviation}
+
+
+def held_to(rig, deviations):
+    """Standard deviation that each parameter is held to at a twentieth."""
+    free = nominal_unknowns(rig.plant, deviations, fixed=["command_delay.delay_s"])
+    fit = SimpleNamespace(unknowns=free, windows=SimpleNamespace(plant=rig.plant))
+    found = free.scale / np.sqrt(hardly_moving(fit, 0.05).precision)
+    return dict(zip(free.names, found.tolist(), strict=True))
 
 
 def test_nothing_held_out_counts_nothing(problem, sound):
