@@ -10,7 +10,12 @@ from scipy.signal import lsim
 from tests.linear_plant import DAMPING_N_S_M, MASS_KG, STIFFNESS_N_M, cart
 from workbench.diagnosis.size import _forms
 from workbench.fitting.gauss_newton import fit_windows
-from workbench.fitting.posterior import _share_held, both_deviations, posterior_covariance
+from workbench.fitting.posterior import (
+    _normal,
+    _share_held,
+    both_deviations,
+    posterior_covariance,
+)
 from workbench.fitting.unknowns import Unknowns
 from workbench.fitting.windows import cut_windows
 from workbench.recording import Recording
@@ -26,25 +31,30 @@ def plant():
     return cart()
 
 
-def fitted(plant, stiffness_spread, rng):
-    """The mass, fitted to carts on springs that differ from one recording to the next."""
+def fitted(plant, stiffness_spread, rng, windows_each=1):
+    """The mass, fitted to carts on springs that differ from one recording to the next.
+
+    Each recording is cut into so many windows, of which the states at their starts are known.
+    """
     sigma = {"cart.position_m": NOISE_M}
     pushes = rng.uniform(-5.0, 5.0, (WINDOWS, LENGTH // 5)).repeat(5, axis=1)
     springs = STIFFNESS_N_M * (1.0 + stiffness_spread * rng.standard_normal(WINDOWS))
+    paths = [moved(spring, push) for spring, push in zip(springs, pushes, strict=True)]
     recordings = [
         Recording(
             f"cart {k}",
             SAMPLE_S,
             {
                 "drive.force_n": push,
-                "cart.position_m": moved(spring, push) + NOISE_M * rng.standard_normal(LENGTH),
+                "cart.position_m": path[:, 0] + NOISE_M * rng.standard_normal(LENGTH),
             },
         )
-        for k, (spring, push) in enumerate(zip(springs, pushes, strict=True))
+        for k, (path, push) in enumerate(zip(paths, pushes, strict=True))
     ]
-    windows = cut_windows(plant, recordings, sigma, SAMPLE_S * LENGTH, WINDOWS)
-    rest = np.zeros_like(windows.start)
-    windows = replace(windows, start=rest, start_deviation=np.full_like(rest, 1e-6))
+    most = windows_each * WINDOWS
+    windows = cut_windows(plant, recordings, sigma, SAMPLE_S * LENGTH / windows_each, most)
+    known = np.concatenate([path[:: LENGTH // windows_each] for path in paths]).T
+    windows = replace(windows, start=known, start_deviation=np.full_like(known, 1e-6))
     unknowns = Unknowns((MASS,), *map(np.array, ([MASS_KG], [SCALE_KG], [0.5], [8.0], [1e-6])))
     fit = fit_windows(windows, unknowns, iterations=8)
     windows = windows.rescaled(fit.residual)
@@ -52,9 +62,9 @@ def fitted(plant, stiffness_spread, rng):
 
 
 def moved(spring, push):
-    """Position of a cart from rest, exact for a force that holds between samples."""
+    """Position and velocity of a cart from rest, exact for a force that holds between samples."""
     A = [[0.0, 1.0], [-spring / MASS_KG, -DAMPING_N_S_M / MASS_KG]]
-    system = (A, [[0.0], [1.0 / MASS_KG]], [[1.0, 0.0]], [[0.0]])
+    system = (A, [[0.0], [1.0 / MASS_KG]], np.eye(2), np.zeros((2, 1)))
     return lsim(system, push, SAMPLE_S * np.arange(LENGTH), interp=False)[1]
 
 
@@ -68,6 +78,30 @@ def test_a_deviation_tells_how_far_fits_of_other_recordings_are_apart(plant, spr
 
     assert told == pytest.approx(apart, rel=0.4)
     assert spread == 0.0 or curvature < told / 5.0
+
+
+def test_windows_that_follow_one_another_are_wrong_alike(plant):
+    """Five windows of each recording have the same spring; who counts them one by one is too sure.
+
+    The measure is that of whole recordings as the groups, which only this test knows of.
+    """
+    rng = np.random.default_rng(2)
+    fits = [fitted(plant, 0.05, rng, windows_each=5) for _ in range(8)]
+    whole = np.median([of_recordings(fit) for fit in fits])
+    told = np.median([both_deviations(fit)[0] for fit in fits])
+    alone = [replace(f, windows=replace(f.windows, firsts=((0,),) * len(f.windows))) for f in fits]
+    one_by_one = np.median([both_deviations(fit)[0] for fit in alone])
+
+    assert told == pytest.approx(whole, rel=0.25)
+    assert one_by_one < 0.7 * whole
+
+
+def of_recordings(fit):
+    """Standard deviation of the mass where the errors of a recording go together."""
+    normal = _normal(fit)
+    pull = np.einsum("wrp,wr->w", normal.derivatives, normal.residual)
+    pulls = pull.reshape(WINDOWS, -1).sum(axis=1)
+    return SCALE_KG * np.sqrt(WINDOWS / (WINDOWS - 1) * pulls @ pulls) / normal.hessian[0, 0]
 
 
 def test_a_deviation_is_told_by_the_errors_of_the_fit_itself(plant):

@@ -62,19 +62,22 @@ def both_deviations(
     carry their correlation time.  Where the plant lacks something errors go together over many
     samples and outputs, and windows pull a parameter apart by more than that.  How far tells
 
-        H^-1 (n / (n - 1) sum_w g_w g_w' + Lambda) H^-1
+        H^-1 (n / (n - 1) sum_l k_l sum_w g_w g_(w+l)' + Lambda) H^-1
 
-    with g_w the gradient of each of the n windows and Lambda the weights of the prior.  The larger
-    of the two is told, and no more than the prior.  What all windows have wrong alike neither
-    tells.  One that the fit holds at a bound has none, NaN.
+    with g_w the gradient of each of the n windows, Lambda the weights of the prior and k_l from 1
+    down to 0 over a few windows either way within a recording: what a plant has otherwise is alike
+    in windows that follow one another.  The larger of the two is told, and no more than the prior.
+    What all windows have wrong alike neither tells.  One that the fit holds at a bound has none,
+    NaN.
 
     The curvature's deviation of a strength is that with the forms held that it is ``shaped_by``:
     where the strength is none no form can be known, so one that is hardly known says nothing of
     whether the strength is there.
 
     Source: White 1982, "Maximum likelihood estimation of misspecified models"; in groups of errors
-    that go together, Liang and Zeger 1986; of forms, Davies 1977 and 1987, "Hypothesis testing when
-    a nuisance parameter is present only under the alternative".
+    that go together, Liang and Zeger 1986; in groups that follow one another, Newey and West 1987
+    and 1994, "Automatic lag selection in covariance matrix estimation"; of forms, Davies 1977 and
+    1987, "Hypothesis testing when a nuisance parameter is present only under the alternative".
     """
     scale, prior = fit.unknowns.scale, fit.unknowns.precision
     if not len(fit.unknowns):
@@ -84,7 +87,8 @@ def both_deviations(
     known = np.sqrt(np.maximum(np.diag(inverse), 0.0))
     known = np.where(normal.precision > 0.0, known, np.nan)
     most = np.fmax(1.0 / np.sqrt(np.maximum(prior, 1e-300)), known)
-    told = np.clip(np.sqrt(np.diag(inverse @ _pulls(normal) @ inverse)), known, most)
+    pulls = _pulls(normal, [len(firsts) for firsts in fit.windows.firsts])
+    told = np.clip(np.sqrt(np.diag(inverse @ pulls @ inverse)), known, most)
     for name, forms in shaped_by.items():
         k = fit.unknowns.names.index(name)
         known[k] *= _share_held(normal.hessian, inverse, k, [*map(fit.unknowns.names.index, forms)])
@@ -99,11 +103,20 @@ def _share_held(hessian: np.ndarray, inverse: np.ndarray, k: int, forms: list[in
     return float(np.sqrt(held[place, place] / inverse[k, k]))
 
 
-def _pulls(normal: Normal) -> np.ndarray:
-    """Covariance of the gradient, of the windows as they differ and of the prior, (n_p, n_p)."""
+def _pulls(normal: Normal, counts: Sequence[int]) -> np.ndarray:
+    """Covariance of the gradient, of the windows as they differ and of the prior, (n_p, n_p).
+
+    ``counts`` are windows of each recording, one after the other.
+    """
     by_window = np.einsum("wrp,wr->wp", normal.derivatives, normal.residual)
     n = len(by_window)
-    return n / max(n - 1, 1) * (by_window.T @ by_window) + np.diag(normal.precision)
+    lags = int(4.0 * (n / 100.0) ** (2.0 / 9.0))  # Newey and West 1994, for Bartlett's weights
+    pulls = by_window.T @ by_window
+    for own in np.split(by_window, np.cumsum(counts)[:-1]):
+        for lag in range(1, min(lags, len(own) - 1) + 1):
+            both = own[lag:].T @ own[:-lag]
+            pulls += (1.0 - lag / (lags + 1.0)) * (both + both.T)
+    return n / max(n - 1, 1) * pulls + np.diag(normal.precision)
 
 
 def posterior_covariance(fit: Fit) -> np.ndarray:
