@@ -191,7 +191,7 @@ def flow_text(found: FlowFit) -> str:
             (
                 curve.label,
                 shown(curve.area_m2.value, "area_m2"),
-                *(f"{e.value:.3f} +- {e.deviation:.3f}" for e in curve.shape.values()),
+                *(f"{e.value:.4f} +- {e.deviation:.4f}" for e in curve.shape.values()),
                 shown(curve.mean_absolute_error, "error_pa", 2),
                 shown(error_pa, "error_pa", 2),
                 _ended(curve),

@@ -110,7 +110,6 @@ def test_of_twelve_hidden_effects_nine_come_first_and_eleven_at_least_in_a_print
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(strict=True, reason="spool_leak, 33 %, stands behind a sensor's lag that shows")
 def test_of_twelve_hidden_effects_all_that_show_come_at_least_in_a_printed_tie():
     found, shown = twelve()
 
@@ -159,7 +158,6 @@ def test_the_rivals_of_a_leader_are_asked_also_where_it_leads_from_another_s_pla
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(strict=True, reason="friction along the stroke makes four that do the same")
 def test_the_rivals_of_a_leader_are_a_tie_of_three():
     found = throttled()
 

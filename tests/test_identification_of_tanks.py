@@ -16,10 +16,11 @@ from studies.truth import dedicated as truth
 from studies.truth import drive as true
 from workbench.comparison import compare
 from workbench.errors import InputError
-from workbench.identification import PROCEDURES, least_squares
+from workbench.identification import PROCEDURES, least_squares, tank_pieces
 from workbench.identification.dead_zone import dead_zone
 from workbench.identification.estimate import end_reached
 from workbench.identification.tank_curves import LEAN, tank_curves
+from workbench.identification.tank_pieces import _at_the_opening
 from workbench.rig import default_rig, load_rig
 from workbench.rig_writing import rig_text
 
@@ -88,6 +89,26 @@ def test_tank_curves_fit_within_what_the_paper_reports(flow):
     assert max(flow.rig_errors_pa) < 0.04e5
 
 
+def test_a_curve_begins_where_a_leak_has_taken_the_tank_by_the_opening():
+    """Paper 002's small tank gains 32 mbar in the tenth of a second before, noise 3 mbar."""
+    rng = np.random.default_rng(0)
+    noise_pa, time_s = 300.0, 0.002 * np.arange(50)
+    leads = [1e5 + 32e3 * time_s + noise_pa * rng.standard_normal(50) for _ in range(200)]
+    found = np.array([_at_the_opening(lead, 0.002) for lead in leads])
+
+    assert np.mean(found) == pytest.approx(1.032e5, abs=20.0)
+    assert np.std(found) < 0.35 * noise_pa
+
+
+def test_a_lead_that_does_not_drift_is_known_by_its_mean():
+    rng = np.random.default_rng(1)
+    leads = 1e5 + 300.0 * rng.standard_normal((200, 50))
+    found = np.array([_at_the_opening(lead, 0.002) for lead in leads])
+
+    assert np.mean(found == leads.mean(axis=1)) > 0.9
+    assert _at_the_opening(np.full(5, 1e5), 0.002) == 1e5
+
+
 def test_flow_needs_the_dead_zone_first(curves):
     said = r"right dead zone, .* valve_dead_zone.centre, .*leak_area; .*identify dead-zone"
     with pytest.raises(InputError, match=said):
@@ -141,6 +162,14 @@ def test_flow_parameters_of_each_path_come_out(flow):
         assert curve.subsonic_index.value == pytest.approx(0.52, abs=0.03)
 
 
+def test_the_critical_ratio_of_every_opening_comes_out(flow):
+    """Begun at the mean of the lead, as if the closed spool did not leak, they were 0.03 low."""
+    for curve in flow.curves:
+        if curve.label != "charging 5.00 V":
+            true_ratio = 0.35 if curve.charging else 0.30
+            assert curve.critical_ratio.value == pytest.approx(true_ratio, abs=0.012), curve.label
+
+
 def shape_at_ends(known, curve):
     """Which values of a curve's own shape stand at an end of their range."""
     side = "supply" if curve.charging else "exhaust"
@@ -163,14 +192,22 @@ def test_the_curve_of_the_closed_valve_keeps_the_shape_of_the_rig_as_it_says_not
         found, lean = closed.shape[letter], LEAN[letter]
         assert found.value == pytest.approx(own[f"valve.{name}"], abs=0.01 * lean), name
         assert found.deviation == pytest.approx(lean, rel=0.01), name
+    assert closed.at_bound == ()
+
+
+def test_of_open_paths_only_a_small_one_leaves_a_value_at_its_bound(flow):
+    """At 4.2 V the cracking ratio is known to 0.015, and its truth lies 0.005 from its bound."""
     for curve in flow.curves:
-        assert not shape_at_ends(flow.rig.plant.parameters, curve), curve.label
-        assert curve.at_bound == (), curve.label
+        ends = shape_at_ends(flow.rig.plant.parameters, curve)
+        assert list(curve.at_bound) == ends, curve.label
+        small = curve.label == "discharging 4.20 V"
+        assert ends == (["cracking_ratio"] if small else []), curve.label
 
 
 def test_a_curve_whose_shape_ends_at_bounds_says_which(limits, curves, monkeypatch):
-    """Weighed against the noise alone, nothing holds the shape of the closed valve's curve."""
+    """Begun at the mean of the lead and weighed by noise alone, the closed valve has none."""
     monkeypatch.setattr(least_squares, "WEIGHINGS", 1)
+    monkeypatch.setattr(tank_pieces, "DRIFTS", np.inf)
     found = tank_curves(limits.improved(), curves)
 
     for curve in found.curves:

@@ -20,7 +20,9 @@ from workbench.diagnosis.follow import follow
 from workbench.diagnosis.judge import (
     CERTAIN_SHARE,
     SHARE_REASON,
+    clearly_less,
     leaves_clearly_less,
+    left_held_out,
     share_removed,
 )
 from workbench.diagnosis.law import better_base, empirical_law, standing
@@ -164,7 +166,7 @@ def _law(
     """An empirical law, unless an effect of the catalogue explains most of the misfit already.
 
     A parameter that leaves its prior is no such effect: it may well imitate the law.  So the law
-    is to leave a fifth less than the best effect, and only less than the best shift; what fails
+    is to leave a fifth less than every effect, and only less than the best shift; what fails
     another criterion than its share is no rival.  The scan of an effect that keeps little of its
     drop on what is held out bars no law, and neither does a share that a whole crowd removes: a
     sagging cable is a force to four sensors, and its curve is what they leave.
@@ -178,15 +180,24 @@ def _law(
     led_by = (p.drop for p in profiles if keeps and p.candidate == leader.candidate)
     law = empirical_law(problem, profiles, max(led_by, default=0.0), None if certain else where)
     followed = [r for r in ranking if r.accepted or r.reasons == (SHARE_REASON,)]
-    effect, shift = (
-        max((r.drop_train for r in followed if r.kind is kind), default=0.0)
-        for kind in (Kind.EFFECT, Kind.PARAMETER)
-    )
-    if law is None:
-        return None
-    if not leaves_clearly_less(law.drop_train, effect):
+    effects = [r for r in followed if r.kind is Kind.EFFECT]
+    shift = max((r.drop_train for r in followed if r.kind is Kind.PARAMETER), default=0.0)
+    if law is None or not _leaves_less(law, effects):
         return None
     return law if law.drop_train > shift else None
+
+
+def _leaves_less(law: Law, effects: Sequence[Ranked]) -> bool:
+    """True where a law leaves a fifth less than every effect in training.
+
+    Or of what is held out, with no more left in training: where next to nothing is left there by
+    both, nobody can tell a fifth of it.
+    """
+    best = max((each.drop_train for each in effects), default=0.0)
+    if leaves_clearly_less(law.drop_train, best):
+        return True
+    least = min(map(left_held_out, effects), default=0.0)
+    return law.drop_train > best and clearly_less(left_held_out(law), least)
 
 
 def _concluded(

@@ -157,6 +157,6 @@ def leaves_clearly_less(drop: float, other: float) -> bool:
     return clearly_less(max(1.0 - drop, LITTLE_LEFT), max(1.0 - other, LITTLE_LEFT))
 
 
-def left_held_out(each: Refit | Ranked) -> float:
+def left_held_out(each: Refit | Law | Ranked) -> float:
     """Share of the held-out misfit that is left, at least one percent."""
     return 1.0 if isnan(each.drop_validation) else max(1.0 - each.drop_validation, 0.01)

@@ -12,6 +12,7 @@ from workbench.consistency import checked
 from workbench.fitting.begun_anew import begun_anew
 from workbench.fitting.errors import Errors, errors_of
 from workbench.fitting.gauss_newton import Fit
+from workbench.fitting.no_worse import no_worse_than_it_came
 from workbench.fitting.own_errors import by_own_errors
 from workbench.fitting.posterior import (
     FLAT,
@@ -104,6 +105,10 @@ def fit(
     problem = problem if own is problem.base else problem.with_base(own)
     progress("from short windows, if that is better")
     problem = better_from_short_windows(problem, train)
+    progress("no worse than it came")
+    least = no_worse_than_it_came(problem.base)
+    if least is not problem.base:
+        problem = problem.with_base(no_worse_than_it_came(by_own_errors(least)))
     base = problem.base
     before = errors_of(*as_it_came(base, problem.base_validation))
     covariance = posterior_covariance(base)

@@ -14,6 +14,7 @@ from workbench.fitting.continued import continued
 from workbench.fitting.costs import points_costs
 from workbench.fitting.gauss_newton import Fit, beyond_noise, fit_windows
 from workbench.fitting.linearised import Linearised, Point, plant_at
+from workbench.fitting.no_worse import no_worse_than_it_came
 from workbench.fitting.noise import measured_noise
 from workbench.fitting.own_errors import ITERATIONS, consistent, weighed_anew
 from workbench.fitting.pulled_in import towards_priors
@@ -171,7 +172,8 @@ def pose(
     ``progress`` is told of each stage, since a stiff plant takes a minute for one.
 
     The fit is made twice, the second time with the error model of the first, and again where that
-    one tells far other errors; then from starts that earlier windows give and points beside it.
+    one tells far other errors; then from starts that earlier windows give and points beside it,
+    and from the values that the rig came with where these cost less.
 
     Raises
     ------
@@ -191,7 +193,7 @@ def pose(
     progress("prior fit weighed by its own errors")
     found = continued(consistent(first), ITERATIONS)
     progress("prior fit from points beside it")
-    base = shaken(found, ITERATIONS)
+    base = no_worse_than_it_came(shaken(found, ITERATIONS))
     held_out = None
     if validation:
         progress("prior fit on what is held out")

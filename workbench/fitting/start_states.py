@@ -6,18 +6,21 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from workbench.fitting.continued import continued
 from workbench.fitting.costs import best_of_each, points_costs
 from workbench.fitting.gauss_newton import Fit, fit_windows
 from workbench.fitting.linearised import Point, seen_at
 from workbench.fitting.unknowns import Unknowns
 from workbench.fitting.windows import Windows
 
+ITERATIONS = 8
+
 
 def refit_starts(
     windows: Windows,
     values: Mapping[str, float] | None = None,
     near: Fit | None = None,
-    iterations: int = 8,
+    iterations: int = ITERATIONS,
     others: Sequence[np.ndarray] = (),
 ) -> Fit:
     """Only the start states move: how well a plant with given values predicts a recording.
@@ -40,13 +43,15 @@ def as_it_came(base: Fit, held_out: Fit | None) -> tuple[Fit, Fit | None]:
     """A plant before a fit moved its parameters, on the windows of that fit and of its validation.
 
     Only start states are fitted, with the weights of the fit; they may begin where the fit has
-    them, so that the plant as it came is not worse for a start that was not found.
+    them, or where the window before ends, so that the plant as it came is not worse for a start
+    that was not found.
     """
-    came = refit_starts(base.windows, base.windows.plant.values, others=[base.point.starts])
-    if held_out is None:
-        return came, None
-    values, starts = base.windows.plant.values, [held_out.point.starts]
-    return came, refit_starts(held_out.windows, values, others=starts)
+    values = base.windows.plant.values
+    came, theirs = (
+        fit and continued(refit_starts(fit.windows, values, others=[fit.point.starts]), ITERATIONS)
+        for fit in (base, held_out)
+    )
+    return came, theirs
 
 
 def _same_states(near: Fit, windows: Windows) -> bool:

@@ -15,6 +15,8 @@ from workbench.recording import Recording
 
 STEADY_V = 0.02  # a command that stays within is constant
 LEAST_LEAD = 5  # samples with the valve still closed
+LEAD_S = 0.1  # before the opening: so far back a straight line is taken through the pressure
+DRIFTS = 2.0  # standard deviations of its slope from which on that is none of noise
 LEAST_SAMPLES = 30
 CLEARLY_V = 0.2  # that far outside the dead zone a path is open
 LEAST_RISE = 0.1  # of supply minus ambient, with an open path
@@ -76,7 +78,7 @@ def _piece(tank: TankOnValve, recording: Recording) -> Piece:
     charging = command_v >= centre_v
     is_open = abs(command_v - centre_v) > half_v + CLEARLY_V
     lead = recording.part(0, max(opened, LEAST_LEAD))
-    start_pa = float(np.mean(lead[plant.measured[0]]))
+    start_pa = _at_the_opening(lead[plant.measured[0]], lead.sample_time_s)
     if is_open:
         _check_open(tank, rest, start_pa, charging)
     pressure = rest[plant.measured[0]]
@@ -107,6 +109,19 @@ def _opening(tank: TankOnValve, recording: Recording) -> tuple[int, float]:
     return opened, float(np.median(sent))
 
 
+def _at_the_opening(lead_pa: np.ndarray, sample_time_s: float) -> float:
+    """The pressure one sample after a lead, (n,): its mean, or on its line where it drifts.
+
+    A closed valve leaks: within a tenth of a second a small tank is several noise deviations off
+    the mean of the lead, and what a curve begins with too low its path has to make up for.
+    """
+    near = lead_pa[-max(round(LEAD_S / sample_time_s), LEAST_LEAD) :]
+    before = np.arange(len(near)) - len(near)
+    (slope, end_pa), covariance = np.polyfit(before, near, 1, cov=True)
+    drifts = abs(slope) > DRIFTS * np.sqrt(covariance[0, 0])
+    return float(end_pa if drifts else near.mean())
+
+
 def _check_open(tank: TankOnValve, rest: Recording, start_pa: float, charging: bool) -> None:
     """An open path charges or empties the tank, and the tank rests where the rig says."""
     pressure, span_pa = rest[tank.plant.measured[0]], tank.span_pa(rest)
@@ -124,7 +139,7 @@ def _check_open(tank: TankOnValve, rest: Recording, start_pa: float, charging: b
 
 
 def _start(tank: TankOnValve, lead: Recording, start_pa: float) -> np.ndarray:
-    """The states at the opening: what the lead shows, at the mean of its pressure."""
+    """The states at the opening: what the lead shows, at the pressure that it ends with."""
     plant = tank.plant
     guess, states = guessed_states(plant, lead)[0, :, 0], list(plant.state_list)
     at = states.index(plant.measured[0])
