@@ -15,6 +15,7 @@ from workbench.units import public_name, si_unit
 
 DIGITS = 4
 ROUNDED = 1e-6  # of the farthest place: what is nearer to zero is a zero that was searched for
+ALONE = "alone: alternates each sample"
 OUTER = {"stiffness": "N/m", "damping": "N s/m", "restoring": "N/(m s)"}
 """The outer gains of a cascade, in their order."""
 
@@ -116,5 +117,16 @@ def _short(state: str) -> str:
 def _poles(poles: np.ndarray) -> str:
     """The slowest first, both of a pair at once."""
     rising = sorted(poles[poles.imag >= 0.0], key=lambda pole: -pole.real)
-    words = (f"{p.real:.{DIGITS}g}" + (f"±{p.imag:.{DIGITS}g}j" if p.imag else "") for p in rising)
-    return ", ".join(words)
+    return ", ".join(_pole(p, paired=np.isclose(poles, p.conjugate()).any()) for p in rising)
+
+
+def _pole(pole: complex, paired: bool) -> str:
+    """One pole, or a pair.
+
+    One alone off the real axis is that of a sampled loop at a negative z, which has no partner: its
+    logarithm has pi over the sample time for an imaginary part.
+    """
+    real, imaginary = f"{pole.real:.{DIGITS}g}", f"{pole.imag:.{DIGITS}g}j"
+    if not pole.imag:
+        return real
+    return f"{real}±{imaginary}" if paired else f"{real}+{imaginary} ({ALONE})"

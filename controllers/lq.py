@@ -32,7 +32,8 @@ class Gain:
 
     feedback      K in V per unit of state, shape (4,)
     integral      K_i in V/(m s)
-    poles         of the closed loop with integral, on the plane of s, 1/s, shape (5,)
+    poles         of the closed loop with integral, on the plane of s, 1/s, shape (5,); of one at
+                  a negative z, which has no partner, that with the positive imaginary part
     """
 
     feedback: np.ndarray

@@ -5,8 +5,9 @@ Cuts come from a user, so everything wrong with them is said at once, one messag
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 from math import isfinite
 
@@ -82,12 +83,26 @@ class Jump:
     ratio: float
 
 
+@dataclass(frozen=True)
+class Wording:
+    """What signals and their values are called where something is wrong with them.
+
+    name     a signal: by default its full name, which a program knows it by
+    value    what a signal is at, of its full name and the value: by default in SI
+    """
+
+    name: Callable[[str], str] = str
+    value: Callable[[str, float], str] = lambda signal, value: f"{value:g}"
+
+
 Region = Interval | Level
 Cuts = Mapping[str, tuple[Region, ...]]
 Box = Mapping[str, Region]
 
 
-def checked(model: DesignModel, cuts: Mapping[str, Iterable[Region]]) -> Cuts:
+def checked(
+    model: DesignModel, cuts: Mapping[str, Iterable[Region]], words: Wording | None = None
+) -> Cuts:
     """The same cuts as tuples, once nothing is wrong with them.
 
     Raises
@@ -97,74 +112,84 @@ def checked(model: DesignModel, cuts: Mapping[str, Iterable[Region]]) -> Cuts:
         interval, label that stands twice, and level that a switch does not have or that is missing.
     """
     found = {signal: tuple(regions) for signal, regions in cuts.items()}
-    if wrong := [m for item in found.items() for m in _wrong(model, *item)]:
+    words = words or Wording()
+    if wrong := [m for item in found.items() for m in _wrong(model, *item, words)]:
         raise InputError(*wrong)
     return found
 
 
-def _wrong(model: DesignModel, signal: str, regions: tuple[Region, ...]) -> Iterator[Message]:
-    known = (*model.states, *model.commands)
-    if signal not in known:
+def _wrong(
+    model: DesignModel, signal: str, regions: tuple[Region, ...], words: Wording
+) -> Iterator[Message]:
+    known, called = [words.name(n) for n in (*model.states, *model.commands)], words.name(signal)
+    if called not in known:
         what = f"{model.plant.name} has no such signal to cut"
-        yield Message(what, signal, listed(known), nearest(signal, known))
+        yield Message(what, called, listed(known), nearest(called, known))
         return
     if not regions:
-        yield Message("is cut into nothing", signal, "at least one interval or level")
+        yield Message("is cut into nothing", called, "at least one interval or level")
     labels = [region.label for region in regions]
     for label in dict.fromkeys(label for label in labels if labels.count(label) > 1):
-        yield Message(f"{labels.count(label)} regions are called '{label}'", signal)
+        yield Message(f"{labels.count(label)} regions are called '{label}'", called)
+    states = [words.name(name) for name in model.states]
     for region in regions:
-        for name in region.holds:
-            if name not in model.states:
-                what = f"'{region.label}' holds {name}, which is no state"
-                yield Message(what, signal, listed(model.states), nearest(name, model.states))
+        for held in map(words.name, region.holds):
+            if held not in states:
+                what = f"'{region.label}' holds {held}, which is no state"
+                yield Message(what, called, listed(states), nearest(held, states))
     intervals = [region for region in regions if isinstance(region, Interval)]
     levels = [region for region in regions if isinstance(region, Level)]
+    at = partial(words.value, signal)
     if levels or _values(model, signal):
-        yield from _wrong_levels(model, signal, levels, intervals)
+        wrong = _wrong_levels(model, signal, levels, intervals, at)
     else:
-        yield from _wrong_intervals(signal, intervals)
+        wrong = _wrong_intervals(intervals, at)
+    yield from (replace(each, name=called) for each in wrong)
 
 
-def _wrong_intervals(signal: str, intervals: list[Interval]) -> Iterator[Message]:
+def _wrong_intervals(intervals: list[Interval], at: Callable[[float], str]) -> Iterator[Message]:
     for part in intervals:
-        span = f"'{part.label}', {part.lower:g} to {part.upper:g},"
+        span = f"'{part.label}', {at(part.lower)} to {at(part.upper)}"
         if not part.lower < part.upper:
-            yield Message(f"{span} is empty", signal, "lower < upper")
+            yield Message(f"{span}, is empty", expected="lower < upper")
         elif not (isfinite(part.point) and part.contains(part.point)):
-            what = f"the point {part.point:g} lies outside {span.removesuffix(',')}"
-            yield Message(what, signal, "lower <= point < upper")
+            what = f"the point {at(part.point)} lies outside {span}"
+            yield Message(what, expected="lower <= point < upper")
     whole = sorted((p for p in intervals if p.lower < p.upper), key=lambda part: part.lower)
     for left, right in pairwise(whole):
         if right.lower < left.upper:
-            shared = f"{right.lower:g} to {min(left.upper, right.upper):g}"
-            yield Message(f"'{left.label}' and '{right.label}' overlap from {shared}", signal)
+            shared = f"{at(right.lower)} to {at(min(left.upper, right.upper))}"
+            yield Message(f"'{left.label}' and '{right.label}' overlap from {shared}")
         elif right.lower > left.upper:
-            gap = f"{left.upper:g} to {right.lower:g}"
-            what = f"nothing covers {gap}, between '{left.label}' and '{right.label}'"
-            yield Message(what, signal)
+            gap = f"{at(left.upper)} to {at(right.lower)}"
+            yield Message(f"nothing covers {gap}, between '{left.label}' and '{right.label}'")
 
 
 def _wrong_levels(
-    model: DesignModel, signal: str, levels: list[Level], intervals: list[Interval]
+    model: DesignModel,
+    signal: str,
+    levels: list[Level],
+    intervals: list[Interval],
+    at: Callable[[float], str],
 ) -> Iterator[Message]:
     values = _values(model, signal)
     if signal in model.states:
-        yield Message("a state passes through its values", signal, "intervals instead of levels")
+        yield Message("a state passes through its values", expected="intervals instead of levels")
         return
     if intervals:
         named = listed(f"'{part.label}'" for part in intervals)
         what = f"{named}: a switched command has no intervals"
-        yield Message(what, signal, "a level for each of its values")
+        yield Message(what, expected="a level for each of its values")
     for level in levels:
         if not isfinite(level.point) or (values and not any(map(level.contains, values))):
-            expected = " or ".join(f"{value:g}" for value in values) or "a finite value"
-            yield Message(f"'{level.label}' is at {level.point:g}", signal, expected)
+            expected = " or ".join(map(at, values)) or "a finite value"
+            yield Message(f"'{level.label}' is at {at(level.point)}", expected=expected)
         elif sum(other.contains(level.point) for other in levels) > 1:
-            yield Message(f"'{level.label}' stands at {level.point:g} as another one", signal)
+            yield Message(f"'{level.label}' stands at {at(level.point)} as another one")
     for value in values:
         if not intervals and not any(level.contains(value) for level in levels):
-            yield Message(f"nothing covers {value:g}", signal, "a level for each of its values")
+            what, expected = f"nothing covers {at(value)}", "a level for each of its values"
+            yield Message(what, expected=expected)
 
 
 def _values(model: DesignModel, signal: str) -> tuple[float, ...]:

@@ -22,6 +22,10 @@ SMALLEST = 1e-14  # relative, of a step and of a slope: what is left decides
 PRESSURE = ".pressure_pa"
 
 
+class NoOperatingPointError(ValueError):
+    """What is asked of an operating point cannot be had."""
+
+
 @dataclass(frozen=True)
 class OperatingPoint:
     """A state and a command of a design model, with what is left of its rates.
@@ -55,7 +59,9 @@ def operating_point(
     Raises
     ------
     ValueError
-        If there are not as many free values as rates, or no solution is found.
+        If there are not as many free values as rates.
+    NoOperatingPointError
+        If no solution is found.
     UnknownNameError
         If a name is neither a state nor a command.
     """
@@ -76,9 +82,8 @@ def operating_point(
     if not search.solved(left):
         at = listed([f"{name} {value:.4g}" for name, value in given.items()]) or "any state"
         still = " and ".join(part for part in (", ".join(vanish[:-1]), vanish[-1]) if part)
-        raise ValueError(
-            f"{model.plant.name}: no operating point at {at} where {still} stand still"
-        )
+        what = f"{model.plant.name}: no operating point at {at} where {still} stand still"
+        raise NoOperatingPointError(what)
     rates = search.residual(values)
     return OperatingPoint(values[:n], values[n:], rates * model.scale, float(np.abs(rates).max()))
 

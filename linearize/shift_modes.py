@@ -4,13 +4,14 @@ Paper 003, Sec. V, has 2 x 2 x 2 = 8.  The ninth, "held at Neutral", is where th
 against the floating one: pressure drives it up from below Neutral and down from above.  Without it
 there is no Neutral at all.
 
-Source: paper 003 Sec. V; physics.md 4.2.  The operating points are chosen.
+Source: paper 003 Sec. V; physics.md 4.2.  The operating points are chosen, see
+:mod:`linearize.shift_points`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import inf
 
 import casadi as ca
@@ -29,6 +30,7 @@ from linearize.modes import (
     placed_at,
 )
 from linearize.reduction import DesignModel
+from linearize.shift_points import SLIDING_M_S, ShiftPoints, require_moved, shift_points
 from linearize.shifting import (
     FLOWS,
     MASSES,
@@ -49,7 +51,6 @@ from workbench.plants.gearbox import COMMANDS, MAIN
 NEUTRAL_M, NEUTRAL_M_S = 1e-4, 1e-2  # held where it is nearer and slower than this
 BESIDE_M = 1e-9  # to either side of Neutral
 AT_NEUTRAL = Interval("held at Neutral", -NEUTRAL_M, NEUTRAL_M, 0.0, (POSITION, VELOCITY))
-SLIDING_M_S = 0.1  # dry friction is all there: tanh(100)
 
 DIRECTIONS = {
     VELOCITY: (
@@ -58,25 +59,6 @@ DIRECTIONS = {
     )
 }
 """A cut for a model that keeps dry friction: its sign is that of the direction."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class ShiftPoints:
-    """Where the modes of a shift are linearised, besides the place.
-
-    charging_pa      pressure of a chamber whose valve joins it to the supply
-    venting_pa       pressure of one whose valve joins it to the air
-    velocity_m_s     speed of the main piston
-    """
-
-    charging_pa: float = 5e5
-    venting_pa: float = 3e5
-    velocity_m_s: float = 0.0
-
-    @property
-    def by_valve(self) -> tuple[tuple[str, float], tuple[str, float]]:
-        """Label and pressure of a released valve, and of an energised one."""
-        return ("vents", self.venting_pa), ("charges", self.charging_pa)
 
 
 def gearbox_modes(
@@ -89,8 +71,15 @@ def gearbox_modes(
 
     The flow at a point is what the valve passes at its pressure.  With several ``pieces`` each side
     has as many operating points; see :func:`side_cut`.
+
+    Raises
+    ------
+    NoOperatingPointError
+        See :func:`linearize.shift_points.require_moved`.
     """
-    points, model = points or ShiftPoints(), model or shift_model(plant)
+    require_moved(plant)
+    model = model or shift_model(plant)
+    points = points or shift_points(model)
     passed = valve_flows(plant)
     cuts: dict[str, tuple[Region, ...]] = {POSITION: side_cut(model, pieces)}
     for number, flow in enumerate(FLOWS):
@@ -116,7 +105,8 @@ def switched_modes(
 
     What the valves pass stands in A and in the drift.
     """
-    points, model = points or ShiftPoints(), model or switched_shift_model(plant)
+    model = model or switched_shift_model(plant)
+    points = points or shift_points(model)
     cuts = {POSITION: side_cut(model, pieces), **valve_cut(points)}
     made = hybrid_modes(plant, cuts, _placing(COMMANDS, points), model)
     return replace(made, jumps=picked_up(model))
@@ -128,7 +118,8 @@ def resting_modes(plant: Plant) -> HybridModel:
     For those who follow the piston: contacts carry whatever the pressures press with.  At Neutral
     they hold it at any speed, since what is not held there has an estimated speed that is not slow.
     """
-    points, model = ShiftPoints(), switched_shift_model(plant)
+    model = switched_shift_model(plant)
+    points = shift_points(model)
     placing = _placing(COMMANDS, points)
     cuts = {**valve_cut(points), POSITION: side_cut(model)}
     return _with_rests(plant, model, cuts, placing, neutral_guards(model)[2:])
@@ -232,7 +223,7 @@ def held_at_neutral(model: DesignModel, points: ShiftPoints | None = None) -> Mo
 
     Both forces are linear in the pressures; they are read off the model on either side.
     """
-    half_pa = (points or ShiftPoints()).charging_pa
+    half_pa = (points or shift_points(model)).charging_pa
     point = operating_point(model, {**dict.fromkeys(PRESSURES, half_pa), POSITION: 0.0})
     return replace(linearised(model, {POSITION: AT_NEUTRAL}, point), guards=neutral_guards(model))
 

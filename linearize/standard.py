@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from linearize.axes import DRIVE, drive_axis, joint_axes, rig_axis, travel_axis
 from linearize.cylinder_modes import place_modes
 from linearize.cylinder_modes import regime_modes as modes_by_regime
-from linearize.equilibrium import OperatingPoint
+from linearize.equilibrium import NoOperatingPointError, OperatingPoint
 from linearize.leg_modes import joint_modes, leg_modes, leg_regimes
 from linearize.modes import HybridModel, Interval, hybrid_modes
 from linearize.reduction import DesignModel, design_model
@@ -208,13 +208,13 @@ def shift_modes(plant: Plant) -> HybridModel:
 def _among(
     known: dict[str, Callable[[Plant], HybridModel]], plant: Plant, none: str
 ) -> HybridModel:
-    """The modes of a plant; where there are none, and more supply would do, that is said."""
+    """The modes of a plant; where one has no point, and more supply would do, that is said."""
     if plant.name not in known:
         names = ", ".join(known)
         raise UnknownNameError(f"{none} {plant.name}; there are some for {names}")
     try:
         return known[plant.name](plant)
-    except ValueError as error:
+    except NoOperatingPointError as error:
         enough_pa = _enough_pa(known[plant.name], plant)
         if enough_pa is None:
             raise
@@ -231,6 +231,6 @@ def _enough_pa(modes: Callable[[Plant], HybridModel], plant: Plant) -> float | N
         return None
     try:
         modes(plant.with_values({SUPPLY: usual_pa}))
-    except ValueError:
+    except NoOperatingPointError:
         return None
     return usual_pa

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from math import inf
+from typing import Any
+
 from studies.following import FOLLOWING_LINES, STEP_LINES
 
 OVERSHOOT = "overshoot"
@@ -34,3 +37,9 @@ EVERYWHERE = ("air_kg", "switches")  # all else asks for an end at rest, or for 
 LONGEST_S = 3600.0  # no run is nearly as long
 ARRIVED = (OVERSHOOT, "limit_cycle")  # of a step that never rose there is none to speak of
 MOVING = ("rmse_m", "rmse_rad", "largest_error_m", "largest_error_rad")
+ROUNDING = 1e-9  # of a bound: 51 samples of 1 ms are more than 51 ms in the last digit
+
+
+def within(found: Any, most: float, least: float = -inf) -> Any:
+    """Whether a figure, or each of an array of them, is as asked, to within rounding."""
+    return (found <= most + ROUNDING * abs(most)) & (found >= least - ROUNDING * abs(least))

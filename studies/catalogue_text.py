@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Sequence
-from pathlib import Path
-from typing import Any
 
 from studies.text import columns, number, shown
 from workbench.candidate import TOGETHER
@@ -138,22 +136,6 @@ def full_names(plant: Plant, names: Sequence[str]) -> tuple[str, ...]:
     if wrong:
         raise InputError(*wrong)
     return tuple(full for name in names for full in known[name])
-
-
-def read_toml(path: Path) -> dict[str, Any]:
-    """The numbers of a specification.
-
-    Raises
-    ------
-    InputError
-        If the file is no TOML.
-    """
-    import tomllib
-
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(Message(f"is no TOML: {error}", file=str(path))) from error
 
 
 def studies_text() -> str:

@@ -234,7 +234,7 @@ class CheckedRuns:
             "estimator": estimator or None,
             "probability": line.probability,
             "interval": [*line.interval],
-            "influences": moved,
+            "influences": None if self.robustness.unranked else moved,
             "worst_run": int(line.worst[0]) + 1,
         }
 

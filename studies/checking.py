@@ -20,6 +20,7 @@ from estimators.raw import RAW
 from linearize.standard import SHIFT_MODES, SLIDE_MODES
 from studies.closed_loop_check import Check, check
 from studies.closed_loop_figures import check_figures
+from studies.controller_calls import fallbacks
 from studies.figures.following import following_figures
 from studies.figures.foot import LEG, foot_figures
 from studies.figures.shifts import shift_figures
@@ -262,6 +263,8 @@ def recorded_runs(loops: Loops, runs: int, say: Callable[[str], None]) -> Checke
         mark = f" {number + 1}" if runs > 1 else ""
         rows += [replace(row, design=row.design + mark) for row in found.rows]
         records += found.records
+    for said in fallbacks(rows):
+        warnings.warn(said, stacklevel=2)
     return replace(found, rows=tuple(rows), records=tuple(records))
 
 

@@ -12,6 +12,8 @@ import numpy as np
 from linearize.axes import stroke_m
 from linearize.reduction import closed_command
 from linearize.standard import POSITION, PRESSURES, SUPPLY
+from studies.asked_lines import within
+from studies.controller_calls import Answered, calls
 from studies.scenarios import LATE_S, SAMPLE_TIME_S, Scenario
 from studies.text import clock, columns, until
 from workbench.closed_loop import LoopRecord
@@ -29,7 +31,7 @@ MARGIN_M, LOWEST_PA, BELOW_SUPPLY_PA = 2e-3, 1.2e5, 5e3
 
 
 @dataclass(frozen=True)
-class Metrics:
+class Metrics(Answered):
     """One row of the table; what makes no sense for a scenario is NaN.
 
     Attributes
@@ -116,8 +118,7 @@ def measure(
         activity_v=float(np.abs(np.diff(command)).sum()),
         switches=valve_switches(plant, command[0]),
         violation_s=_violation_s(plant, record, limits),
-        solve_median_s=float(np.median(record.control_time_s)),
-        solve_p99_s=float(np.percentile(record.control_time_s, 99)),
+        **calls(record),
         estimate_median_s=float(np.median(record.estimate_time_s)),
         amplitude_m=nan if scenario.ends_at_rest else float(np.ptp(wanted) / 2.0),
         way_m=float(np.ptp(wanted)) if scenario.ends_at_rest else nan,
@@ -215,8 +216,7 @@ def _violation_s(plant: Plant, record: LoopRecord, limits: Sequence[Limit] = ())
     outside = (position < MARGIN_M) | (position > stroke_m(plant) - MARGIN_M)
     outside |= ((pressures < LOWEST_PA) | (pressures > highest_pa)).any(axis=0)
     for limit in limits:
-        value = record.recording[limit.figure]
-        outside |= (value < limit.least) | (value > limit.most)
+        outside |= ~within(record.recording[limit.figure], limit.most, limit.least)
     return float(outside.sum() * SAMPLE_TIME_S)
 
 

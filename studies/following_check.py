@@ -14,8 +14,10 @@ from estimators.ahead import in_time
 from estimators.per_mode import chosen_per_mode
 from estimators.raw import RAW, RawMeasurement
 from estimators.scheduled_kalman import ScheduledKalman
+from studies.asked_lines import within
 from studies.closed_loop_check import every_loop
 from studies.closed_loop_metrics import air_used_kg, rise_s, step_figures, valve_switches
+from studies.controller_calls import Answered, calls
 from studies.following import BAND, BENCHES, TICK_S, WITHIN, Task, leg_of
 from studies.tables import NEVER
 from studies.text import clock, columns, number, shown
@@ -30,7 +32,7 @@ LATE_S = 0.1  # the end of a step, where its final error is
 
 
 @dataclass(frozen=True)
-class Followed:
+class Followed(Answered):
     """One run: its figures by full name in SI, and what of them is asked at most."""
 
     design: str
@@ -49,7 +51,7 @@ class Followed:
 
     def holds(self, name: str) -> bool:
         """Whether a figure is as asked; what never ends is not, whatever the open valve does."""
-        return isfinite(self.figures[name]) and self.figures[name] <= self.asked[name]
+        return isfinite(self.figures[name]) and within(self.figures[name], self.asked[name])
 
 
 @dataclass(frozen=True)
@@ -184,8 +186,7 @@ def measured(
         scenario=task.name,
         figures=figures,
         asked={**task.asked, **asked},
-        solve_median_s=float(np.median(record.control_time_s)),
-        solve_p99_s=float(np.percentile(record.control_time_s, 99)),
+        **calls(record),
         estimate_median_s=float(np.median(record.estimate_time_s)),
     )
 

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from studies.checking import Checked, Loops, drawn_plant, loops_of
+from studies.controller_calls import fallbacks
 from studies.kept import Kept, Row
 from studies.specification import Asked
 from studies.verdicts import drawn_values
@@ -139,6 +140,7 @@ def worked(piece: Piece) -> Row:
         (metrics,), (record,) = found.rows, found.records
         lines = {a.name: a.found(metrics, record) for a in setup.asked if scenario in a.scenarios}
         rows.append({**row, "metrics": _written(vars(metrics)), "lines": _written(lines)})
+        said += fallbacks(found.rows)
         name = f"{scenario} with {metrics.design}"
         said += beyond(setup.rig.plant, setup.rig.seen, replace(record.recording, name=name))
     return {"loops": rows, "deviations": off, "warnings": said}

@@ -82,6 +82,12 @@ class Robustness:
     deviations: Mapping[str, np.ndarray]
     each: str = "draw"
 
+    @property
+    def unranked(self) -> str:
+        """Why influences are not known, where there are too few draws for any; empty otherwise."""
+        enough = all(len(line.found) >= FEWEST_RANKED for line in self.lines)
+        return "" if enough else f"{FEWEST_RANKED} {self.each}s or more needed"
+
     def influences(self, line: Line) -> tuple[tuple[str, float], ...]:
         """(parameter, rank correlation) of those that clearly matter, the strongest first."""
         from scipy.stats import rankdata
@@ -117,10 +123,11 @@ class Robustness:
         median = float(np.median(line.found))
         most = float(np.quantile(line.found, CONFIDENCE, method="higher"))  # no draw is invented
         figures = [f"{number(v, 3)} {line.unit}".strip() for v in (median, most, line.found.max())]
-        moved = [f"{public_name(n)} {r:+.2f}" for n, r in self.influences(line)[:MOST_NAMED]]
+        told = [f"{public_name(n)} {r:+.2f}" for n, r in self.influences(line)[:MOST_NAMED]]
+        moved = ", ".join(told) or self.unranked or "-"
         missed = f"{int(line.missed.sum())} of {len(line.missed)}"
         chance = f"{line.probability:.1%} ({low:.1%} to {high:.1%})"
-        return (line.name, line.asked, *figures, missed, chance, ", ".join(moved) or "-")
+        return (line.name, line.asked, *figures, missed, chance, moved)
 
     def told(self, draw: int) -> str:
         """The parameters of one draw that were farthest off."""

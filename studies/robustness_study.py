@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from studies.asked_lines import within
 from studies.checking import drawn
 from studies.closed_loop_check import standard_estimator
 from studies.draws import kept_rows
@@ -101,7 +102,7 @@ def summary(rows: Sequence[Mapping[str, Any]]) -> Robustness:
     lines = []
     for name, (_, _, limit) in LIMITS.items():
         found = figures_of([row["found"] for row in rows], name)
-        lines.append(Line(name, f"at most {limit:g}", found, found > limit))
+        lines.append(Line(name, f"at most {limit:g}", found, ~within(found, limit)))
     names = dict.fromkeys(name for row in rows for name in row["deviations"])
     off = {name: np.array([row["deviations"].get(name, 0.0) for row in rows]) for name in names}
     return Robustness(tuple(lines), off)

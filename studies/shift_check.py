@@ -22,6 +22,8 @@ from estimators.ahead import in_time
 from estimators.shift_filter import ShiftFilter
 from linearize.shift_sample import half_stroke_m
 from linearize.shifting import POSITION, PRESSURES, VELOCITY
+from studies.asked_lines import within
+from studies.controller_calls import Answered, calls
 from studies.text import clock, columns, number, until
 from workbench.closed_loop import Hardware, LoopRecord, close_loop
 from workbench.contracts import Command, Controller, Estimate, Estimator
@@ -67,7 +69,7 @@ class Drive:
 
 
 @dataclass(frozen=True)
-class Shift:
+class Shift(Answered):
     """One shift in closed loop; times from the first sample.
 
     rise_s              from 10 to 90 % of the way
@@ -106,8 +108,8 @@ class Shift:
     @property
     def reached(self) -> bool:
         """True when it ends, fast and soft and not past Neutral, whatever the open loop does."""
-        fast, soft = self.settling_s <= self.longest_s, self.impact_m_s <= self.hardest_m_s
-        return isfinite(self.settling_s) and fast and soft and self.overshoot_m < OVERSHOT_M
+        soft = within(self.impact_m_s, self.hardest_m_s) and self.overshoot_m < OVERSHOT_M
+        return isfinite(self.settling_s) and within(self.settling_s, self.longest_s) and soft
 
 
 @dataclass(frozen=True)
@@ -236,7 +238,6 @@ def _measured(plant: Plant, record: LoopRecord, scenario: str) -> Shift:
     outside = np.flatnonzero(np.abs(gone) > SETTLED_M)
     settled = outside[-1] + 1 if len(outside) else 0
     past = np.sign(target - start) * gone if target == 0.0 else np.zeros(1)
-    commands = recording.rows(plant.model.commands)
     way = (target - start) * end_m
     return Shift(
         design="open loop",
@@ -248,11 +249,10 @@ def _measured(plant: Plant, record: LoopRecord, scenario: str) -> Shift:
         final_error_m=float(np.abs(gone[-round(LATE_S / SAMPLE_TIME_S) :]).max()),
         way_m=abs(way),
         air_kg=air_used_kg(plant, record, SAMPLE_TIME_S),
-        switches=float(np.abs(np.diff(commands, prepend=0.0)).sum()),
+        switches=float(np.abs(np.diff(recording.rows(plant.model.commands), prepend=0.0)).sum()),
         longest_s=np.inf,
         hardest_m_s=np.inf,
-        solve_median_s=float(np.median(record.control_time_s)),
-        solve_p99_s=float(np.percentile(record.control_time_s, 99)),
+        **calls(record),
     )
 
 

@@ -29,6 +29,7 @@ from studies.asked_lines import (
     OVERSHOOT,
     SHIFT_LINES,
     SLIDE_LINES,
+    within,
 )
 from studies.following import BENCHES
 from studies.following_check import Followed, tasks_of
@@ -77,8 +78,12 @@ class Asked:
         return figures[self.figure] if self.figure in figures else getattr(row, self.figure)
 
     def excess(self, found: float) -> float:
-        """How far beyond what is asked: at most 0 where it is met; infinite without a figure."""
+        """How far beyond what is asked: below 0 inside of it; infinite without a figure."""
         return max(self.least - found, found - self.most) if isfinite(found) else inf
+
+    def allows(self, found: float) -> bool:
+        """Whether a figure is as asked, to within rounding; none is not."""
+        return isfinite(found) and bool(within(found, self.most, self.least))
 
     @property
     def ends(self) -> tuple[float, ...]:

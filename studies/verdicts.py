@@ -34,7 +34,7 @@ class Verdict:
     @property
     def met(self) -> tuple[bool, ...]:
         """Whether each run meets the line."""
-        return tuple(bool(self.asked.excess(value) <= 0.0) for value in self.found)
+        return tuple(map(self.asked.allows, self.found))
 
     @property
     def share_met(self) -> float:

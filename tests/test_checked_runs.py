@@ -188,6 +188,31 @@ def test_of_several_runs_those_whose_step_never_rose_are_counted(lq, monkeypatch
     assert found.unreached == (f"step in {heavy} of 9 runs",)
 
 
+def test_a_controller_that_runs_on_its_fallback_is_told_on_stderr_and_in_the_document(
+    lq, monkeypatch, tmp_path
+):
+    """A solver that failed at every sample of a step had been met with a table alone."""
+
+    def failing(loops, plant, seed):
+        (scenario,) = loops.scenarios
+        lost = 600.0 if scenario == "step" else 0.0
+        row = metrics(scenario=scenario, control_samples=650.0, fallback_samples=lost)
+        return Check((row,), (record(),))
+
+    monkeypatch.setattr(Loops, "once", failing)
+    rig, told = tmp_path / "rig.toml", tmp_path / "check.json"
+    rig.write_text('plant = "servo_drive"\n')
+    answer = call("check", rig, lq, "--json", told, "-q")
+    runs = {run["scenario"]: run for run in json.loads(told.read_text())["runs"]}
+
+    assert answer.stderr == (
+        "warning: the controller had no answer, and ran on its fallback, in 600 of 650 samples "
+        "of step with lq and ekf\n"
+    )
+    assert runs["step"]["fallback_samples"] == 600 and runs["sine"]["fallback_samples"] == 0
+    assert runs["step"]["control_samples"] == 650
+
+
 @pytest.mark.parametrize(("call_s", "told"), [(1.9e-3, 0), (2.1e-3, 1)])
 def test_a_control_that_takes_longer_than_its_sample_is_told(
     lq, monkeypatch, recwarn, call_s, told

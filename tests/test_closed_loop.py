@@ -87,6 +87,27 @@ def test_the_estimator_is_told_the_command_that_held_before_its_measurement(plan
     assert np.array(measured)[:, 0] == pytest.approx(record.recording[POSITION][::2])
 
 
+def test_a_record_tells_where_the_controller_fell_back_and_not_where_its_estimator_did(plant):
+    @dataclass(frozen=True)
+    class Lost(Ramp):
+        def step(self, last, reference, estimate):
+            sent = super().step(last, reference, estimate)
+            return replace(sent, notes={"fallback": 1.0} if last.memory in (1, 2) else {})
+
+    @dataclass(frozen=True)
+    class Guessing(Through):
+        def update(self, last, command, measurement):
+            return replace(super().update(last, command, measurement), notes={"fallback": 1.0})
+
+    lost, led = (
+        close_loop(plant, controller, Guessing(), {POSITION: np.full(8, 0.145)})
+        for controller in (Lost(), Ramp())
+    )
+
+    assert lost.fallback.tolist() == [False, True, True, False]
+    assert led.notes["fallback"].all() and not led.fallback.any()
+
+
 def test_the_same_seed_gives_the_same_run_and_another_gives_another(plant, designs):
     estimator = standard_estimator("ekf", plant, 2e-3)
     runs = [

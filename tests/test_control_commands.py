@@ -237,6 +237,28 @@ def test_time_outside_the_limits_is_counted_against_the_own_supply():
     assert _violation_s(PLANT.with_values({"supply.pressure_pa": 6e5}), record) == n * 1e-3
 
 
+def test_a_sample_on_a_limit_is_no_time_outside_of_it():
+    """A position that is on its limit but for the last digit."""
+    from studies.closed_loop_metrics import _violation_s
+    from studies.specification import Limit
+    from workbench.closed_loop import LoopRecord
+    from workbench.recording import Recording
+    from workbench.units import Scale
+
+    names = ("slide.position_m", "chamber_a.pressure_pa", "chamber_b.pressure_pa")
+    values = (np.full(10, value) for value in (0.1, 6e5, 6e5))
+    none = np.zeros((0, 10))
+    channels = dict(zip(names, values, strict=True))
+    record = LoopRecord(Recording("run", 1e-3, channels), none, {}, none, none, {})
+    on, beyond = (
+        Limit("limits.x", names[0], 0.0, 0.1 * (1.0 - off), (), "m", Scale())
+        for off in (1e-15, 1e-8)
+    )
+
+    assert on.most < 0.1 and _violation_s(PLANT, record, [on]) == 0.0
+    assert _violation_s(PLANT, record, [on, beyond]) == 1e-2
+
+
 def test_a_proportional_valve_switches_when_it_goes_over_its_dead_zone():
     centre = 4.95
     beyond = np.array([0.0, 0.3, 0.5, 0.4, 0.5, -0.4, -0.5, 0.0, -0.6, 0.6])

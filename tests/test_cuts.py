@@ -9,9 +9,10 @@ from slide_controllers import SLIDE_CONTROLLERS
 
 import linearize
 from linearize.analysis import require_controllable
-from linearize.cuts import Guard, Interval, Level
+from linearize.cuts import Guard, Interval, Level, Wording, checked
 from linearize.equilibrium import operating_point
 from linearize.modes import hybrid_modes, placed_at
+from linearize.reduction import design_model
 from linearize.shifting import switched_shift_model
 from linearize.standard import POSITION, VELOCITY, slide_modes, standard_modes
 from workbench.errors import InputError
@@ -72,6 +73,18 @@ def test_intervals_that_leave_a_gap_are_refused_with_what_is_missing(plant):
     (line,) = said(plant, {POSITION: [near(0.2, inf, 0.25, "b"), near(-inf, 0.1, 0.0, "a")]})
 
     assert line == f"{POSITION}: nothing covers 0.1 to 0.2, between 'a' and 'b'"
+
+
+def test_a_border_calls_signals_and_values_by_its_own_words(plant):
+    words = Wording(lambda name: name.upper(), lambda signal, value: f"{1e3 * value:g} mm")
+    cuts = {POSITION: [near(0.0, 0.2, 0.1, "a"), near(0.15, inf, 0.1, "b")]}
+
+    with pytest.raises(InputError) as refusal:
+        checked(design_model(plant), cuts, words)
+    outside, overlap = map(str, refusal.value.messages)
+
+    assert outside.startswith(f"{POSITION.upper()}: the point 100 mm lies outside 'b', 150 mm to ")
+    assert overlap == f"{POSITION.upper()}: 'a' and 'b' overlap from 150 mm to 200 mm"
 
 
 def test_a_cut_into_nothing_and_a_label_twice_are_refused(plant):

@@ -3,8 +3,9 @@
 import pytest
 from commands import call
 
+from linearize.equilibrium import NoOperatingPointError
 from linearize.standard import SLIDE_MODES, slide_modes
-from workbench.errors import InputError
+from workbench.errors import InputError, Message
 from workbench.plants.servo_drive import servo_drive
 
 
@@ -157,8 +158,35 @@ def test_a_supply_at_ambient_pressure_is_refused_in_words_of_the_project(supply_
 
 def test_a_point_that_is_missing_for_another_reason_is_not_blamed_on_the_supply(monkeypatch):
     def stuck(plant):
-        raise ValueError("servo_drive: no operating point at all")
+        raise NoOperatingPointError("servo_drive: no operating point at all")
 
     monkeypatch.setitem(SLIDE_MODES, "servo_drive", stuck)
     with pytest.raises(ValueError, match=r"^servo_drive: no operating point at all$"):
         slide_modes(servo_drive().with_values({"supply.pressure_pa": 1.1e5}))
+
+
+def test_what_else_goes_wrong_below_the_usual_supply_is_not_called_too_low_to_move(monkeypatch):
+    """Any error that went with more supply had been rephrased as one of motion."""
+
+    def cut(plant):
+        if plant.values["supply.pressure_pa"] < 7e5:
+            raise InputError(Message("the point lies outside", "valve_1.flow_kg_s"))
+
+    monkeypatch.setitem(SLIDE_MODES, "servo_drive", cut)
+    with pytest.raises(InputError, match=r"^valve_1\.flow_kg_s: the point lies outside$"):
+        slide_modes(servo_drive().with_values({"supply.pressure_pa": 5e5}))
+
+
+@pytest.mark.parametrize(
+    ("supply", "code"), [("4.9 bar", 0), pytest.param("4 bar", 2, id="no Low")]
+)
+def test_a_gearbox_is_designed_where_its_commands_still_lead_everywhere(tmp_path, supply, code):
+    """At 4.9 bar all four shifts end in open loop, at 4 bar none leads to Low from everywhere."""
+    rig = tmp_path / "rig.toml"
+    rig.write_text(f'plant = "gearbox"\n[values]\n"supply.pressure" = "{supply}"\n')
+    modes = call("modes", rig, "--no-validity", "-q")
+    made = call("design", rig, "--controller", "hybrid-mpc", "-o", tmp_path / "hm.toml", "-q")
+
+    assert modes.exit_code == 0, modes.output
+    assert made.exit_code == code and "too low to move" not in made.stderr
+    assert ("no commands of gearbox lead to -12 mm" in made.stderr) is (code == 2)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from controllers.design_file import design, write_design
-from controllers.gain_text import gains
+from controllers.gain_text import gain_rows, gains
 from controllers.lq import Gain
 from controllers.scheduled import constant
 from workbench.plants.crr_leg import crr_leg
@@ -34,6 +34,19 @@ def test_every_gain_has_its_state_its_unit_and_four_digits():
         ),
         ("forward at 0 m, poles", "-1.432, -49.31±78.24j, -59.89 1/s"),
     ]
+
+
+def test_a_pole_at_a_negative_z_is_told_once_and_as_what_it_is():
+    """At 50 ms a loop of five states had six poles: the one without a partner stood as a pair."""
+    (row, *_), (_, (_, told), *_) = (
+        [*each(design("lq", servo_drive(), {"sample_time_s": 0.05}).controller)]
+        for each in (gain_rows, gains)
+    )
+    (alone,) = (pole for pole in row.poles if pole.imag == pytest.approx(np.pi / 0.05))
+    words = told.removesuffix(" 1/s").split(", ")
+
+    assert len(row.poles) == 5 == len(words) + told.count("±")
+    assert words[-1] == f"{alone.real:.4g}+62.83j (alone: alternates each sample)"
 
 
 @pytest.mark.parametrize(

@@ -28,6 +28,7 @@ def cut(folder, *regions, signal="slide.position"):
     return path
 
 
+STATES = 'expected a list of states, as ["slide.position"]'
 SLOW = ("crr_rig", "crr_arm")  # half a minute each: linkages
 ANY = [pytest.param(each, marks=pytest.mark.slow) if each in SLOW else each for each in PLANTS]
 
@@ -71,23 +72,68 @@ def test_cuts_of_ones_own_make_the_modes(tmp_path):
     ("regions", "signal", "said"),
     [
         ([NEAR], "slide.postion", "has no such signal to cut; expected slide.position, "),
-        ([NEAR.replace("50 mm", "150 mm")], None, "the point 0.15 lies outside 'near', -inf to"),
-        ([FAR.replace("label", 'upper = "90 mm", label')], None, "'far', 0.1 to 0.09, is empty"),
-        ([NEAR, FAR.replace("100", "90")], None, "'near' and 'far' overlap from 0.09 to 0.1"),
-        ([NEAR, FAR.replace("100", "110")], None, "nothing covers 0.1 to 0.11, between"),
+        (
+            [NEAR.replace("50 mm", "15 cm")],
+            None,
+            "the point 15 cm lies outside 'near', -inf to 100 mm; expected lower <= point < upper",
+        ),
+        ([FAR.replace("label", 'upper = "9 cm", label')], None, "'far', 100 mm to 9 cm, is empty"),
+        ([NEAR, FAR.replace("100", "90")], None, "'near' and 'far' overlap from 90 mm to 100 mm"),
+        ([NEAR, FAR.replace("100", "110")], None, "nothing covers 100 mm to 110 mm, between"),
+        ([NEAR, FAR.replace("far", "near")], None, "2 regions are called 'near'"),
+        ([], None, "is cut into nothing; expected at least one interval or level"),
+        (['{ label = "a", level = "1 mm" }'], None, "expected intervals instead of levels"),
         ([NEAR.replace("mm", "bar")], None, "unit 'bar' does not fit; expected m"),
         ([NEAR.replace("point", "poind")], None, "a region has no 'poind'"),
         ([NEAR.replace("label", "name")], None, "a region lacks its label"),
         (["5"], None, "5 is no region"),
+        ([NEAR.replace("label", "holds = 3, label")], None, f"holds: is 3; {STATES}"),
+        ([NEAR.replace("label", 'holds = "x", label')], None, f"holds: is 'x'; {STATES}"),
+        ([NEAR.replace("label", "holds = [3], label")], None, f"holds: is [3]; {STATES}"),
+        (
+            [NEAR.replace("label", 'holds = ["slide.positon"], label')],
+            None,
+            "'near' holds slide.positon, which is no state; expected slide.position, slide.vel"
+            "ocity, chamber_a.pressure, chamber_b.pressure; did you mean 'slide.position'?",
+        ),
+        ([NEAR.replace('"near"', '["near"]')], None, "label: is ['near']; expected a text"),
+        ([NEAR.replace('"50 mm"', "[50]")], None, "point: [50] is no quantity; expected"),
     ],
 )
 def test_wrong_cuts_are_told_in_one_clear_message(tmp_path, regions, signal, said):
-    path = cut(tmp_path, *regions, signal=signal or "slide.position")
+    name = signal or "slide.position"
+    path = cut(tmp_path, *regions, signal=name)
 
     answer = call("modes", DRIVE, "--cuts", path, "-q")
 
     assert answer.exit_code == 2
     assert said in answer.stderr
+    for line in answer.stderr.removeprefix("workbench: ").splitlines():
+        assert line.startswith(f"{path}:2: {name}: ") and "_m" not in line.removeprefix(str(path))
+
+
+def test_the_values_of_a_switch_are_told_as_typed_too(tmp_path):
+    (tmp_path / "rig.toml").write_text('plant = "gearbox"\n')
+    regions = '{ label = "off", level = 0 }, { label = "half", level = "50 %" }'
+    path = cut(tmp_path, regions, signal="valve_1.command")
+
+    answer = call("modes", tmp_path / "rig.toml", "--cuts", path, "-q")
+    first, second = answer.stderr.splitlines()
+
+    assert answer.exit_code == 2
+    assert first == f"workbench: {path}:2: valve_1.command: 'half' is at 50 %; expected 0 or 1"
+    assert second.startswith(f"{path}:2: valve_1.command: nothing covers 1; expected a level for")
+
+
+def test_cuts_that_cannot_be_read_are_refused_with_their_line(tmp_path):
+    path = tmp_path / "cuts.toml"
+    path.write_text('[cuts]\n"slide.position" = [ {\n')
+
+    broken, none = (call("modes", DRIVE, "--cuts", p, "-q") for p in (path, tmp_path / "cut.toml"))
+
+    assert broken.exit_code == none.exit_code == 2
+    assert broken.stderr.startswith(f"workbench: {path}:") and "expected TOML" in broken.stderr
+    assert "there is no such file; did you mean 'cuts.toml'?" in none.stderr
 
 
 @pytest.mark.parametrize(

@@ -3,12 +3,14 @@
 import numpy as np
 import pytest
 
+from controllers.design_file import design as design_of
 from controllers.linear_mpc import linear_mpc
 from controllers.mpc_spec import MpcSpec
 from controllers.nonlinear_mpc import nonlinear_mpc
 from controllers.program_solvers import Daqp
 from linearize.standard import PRESSURES, standard_modes
-from studies.closed_loop_check import run, standard_estimator
+from studies.closed_loop_check import check, run, standard_estimator
+from studies.controller_calls import fallbacks
 from studies.scenarios import Scenario
 from workbench.plants.servo_drive import servo_drive
 
@@ -50,6 +52,7 @@ def test_started_from_the_last_multipliers_a_run_at_limits_takes_half_the_iterat
     assert apart.max() < 1e-9
 
 
+PRICES = {"absurd": {"slack_price": 1e300}, "usual": {}}
 DESIGNS = {"mpc": linear_mpc, "nonlinear-mpc": nonlinear_mpc}
 
 
@@ -57,6 +60,20 @@ DESIGNS = {"mpc": linear_mpc, "nonlinear-mpc": nonlinear_mpc}
 def design(request, hybrid):
     """A design by its specification."""
     return lambda **numbers: DESIGNS[request.param](hybrid, MpcSpec(**numbers))
+
+
+def test_a_check_counts_the_samples_in_which_no_program_was_solved():
+    """A price that no number stands beside: 100 mm were missed, and nothing had said why."""
+    plant = servo_drive()
+    made = {name: design_of("mpc", plant, numbers).controller for name, numbers in PRICES.items()}
+    absurd, usual = check(plant, made, ["ekf"], ["step"]).rows
+    resting = 0.1 / made["absurd"].sample_time_s
+
+    assert absurd.control_samples == usual.control_samples == 650
+    assert absurd.fallback_samples == absurd.control_samples - resting and not absurd.reached
+    assert usual.fallback_samples == 0.0 and usual.reached
+    (said,) = fallbacks([absurd, usual])
+    assert said.endswith("ran on its fallback, in 600 of 650 samples of step with absurd and ekf")
 
 
 @pytest.mark.parametrize(("start_m", "beyond_m", "limit_m"), [(0.12, 0.25, 0.2), (0.2, 0.01, 0.09)])

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from studies.draws import kept_rows
+from studies.figures.robustness import influence_figure, spread_figure
 from studies.kept import Kept
 from studies.robustness import Line, Robustness
 from studies.robustness_study import Draw, measured, outcome, summary
@@ -85,6 +86,34 @@ def test_too_few_draws_say_nothing_of_influences(found):
 
     assert few.influences(found.lines[0])
     assert Robustness((short,), {MASS: found.deviations[MASS][:10]}).influences(short) == ()
+
+
+@pytest.mark.parametrize(
+    ("draws", "said"),
+    [
+        (19, "influences: 20 draws or more needed"),
+        (20, "no parameter clearly moves any figure"),
+    ],
+)
+def test_a_figure_of_too_few_draws_says_so_and_not_that_nothing_has_an_influence(draws, said):
+    """Of 13 to 19 runs it had said what nobody had worked out."""
+    values = np.arange(float(draws))
+    lines = (Line("rise", "at most 99", values, values > 99.0),)
+    found = Robustness(lines, {MASS: np.abs(values - values.mean())})
+    (axes,) = influence_figure(found).axes
+
+    assert [text.get_text() for text in axes.texts] == [said]
+    assert found.text.splitlines()[1].endswith("more needed" if draws < 20 else "-")
+
+
+def test_the_marks_of_a_spread_are_the_draws_that_its_table_counts():
+    """One on its limit to within rounding is none of them, nor one without a figure."""
+    values = np.array([1.0, 51.0 * (1.0 + 1e-15), 52.0, np.inf])
+    line = Line("rise", "at most 51", values, np.array([False, False, True, True]))
+    (axes,) = spread_figure(Robustness((line,), {}), {"rise": 51.0}).axes[:1]
+    (marks,) = (each for each in axes.lines if each.get_label() == "missed")
+
+    assert values[1] > 51.0 and marks.get_xdata().tolist() == [52.0]
 
 
 def test_two_drives_of_the_study_differ_and_are_the_same_again(tmp_path):

@@ -1,5 +1,6 @@
 """A check of shifts shows the open loop that its bounds come from, in table and figure."""
 
+from dataclasses import replace
 from math import isinf
 
 import pytest
@@ -28,6 +29,15 @@ def test_time_and_impact_of_the_open_loop_stand_beside_the_bounds_that_follow_fr
     assert all(name in head for name in ("bound of time ms", "open loop ms", "open loop m/s"))
     assert len({*HEAD}) == len(HEAD) == len(first.split()) - 2  # two wall times follow
     assert told == BOUNDS and "1.25 times the time of the open loop" in told
+
+
+def test_a_shift_that_takes_exactly_as_long_as_it_may_is_made_in_spite_of_rounding(found):
+    """1.25 times 44 samples are less than 55 of them in the last digit."""
+    same, _ = found.rows
+    on = replace(same, settling_s=55 * 2.5e-4, longest_s=1.25 * (44 * 2.5e-4), impact_m_s=0.0)
+
+    assert on.settling_s > on.longest_s and on.reached
+    assert not replace(on, settling_s=56 * 2.5e-4).reached
 
 
 def test_a_shift_that_never_ends_is_not_made_even_if_the_open_loop_does_not_make_it():

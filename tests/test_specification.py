@@ -77,6 +77,25 @@ def test_every_line_is_met_up_to_what_it_asks_and_no_further(rig, name, figure):
     assert met == [True, True, False, False, False]
 
 
+@pytest.mark.parametrize(("found_s", "met"), [(51 * 1e-3, True), (51.0001e-3, False)])
+def test_a_line_that_is_met_exactly_is_met_though_its_samples_add_up_to_more(found_s, met):
+    """51 samples of 1 ms had missed 51 ms: in the table `at most 51 ms, 51 ms, no`."""
+    judged = answered('rise_time = "51 ms"', row(rise_s=found_s))
+
+    assert found_s > 0.051
+    assert judged.met is met and judged.document["in_specification"] is met
+
+
+@pytest.mark.parametrize("limit", ['"1.1 bar"', '["1 bar", "1.1 bar"]'])
+def test_a_sample_on_its_limit_is_inside_of_it_to_within_rounding(limit):
+    text, name = f"[limits]\nchamber_a.pressure = {limit}", "chamber_a__pressure_pa"
+    on, beyond = 1.1e5 * (1.0 + 1e-15), 1.1e5 * (1.0 + 1e-8)
+
+    assert on > 1.1e5
+    assert answered(text, row(), records=[record(**{name: [1.05e5, on]})]).met
+    assert not answered(text, row(), records=[record(**{name: [1.05e5, beyond]})]).met
+
+
 @pytest.mark.parametrize(("share", "met"), [(0.0199, True), (0.0201, False)])
 @pytest.mark.parametrize("rig", [DRIVE, GEARBOX], ids=lambda rig: rig.name)
 def test_overshoot_is_asked_as_a_length_or_as_a_share_of_the_way(rig, share, met):

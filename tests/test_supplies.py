@@ -7,6 +7,9 @@ from linearize import equilibrium
 from linearize.equilibrium import operating_point
 from linearize.reduction import design_model
 from linearize.rest import rest_of
+from linearize.shift_modes import held_at_neutral
+from linearize.shift_points import ShiftPoints, shift_points
+from linearize.shifting import shift_model
 from linearize.standard import standard_modes
 from workbench.plants import PLANTS
 
@@ -38,6 +41,36 @@ def test_a_steady_slide_is_found_at_any_usual_supply(plant_name, speed_m_s, supp
     signal = plant.commands[0]
     assert signal.lower <= found.command[0] <= signal.upper
     assert np.sign(found.command[0] - signal.nominal) == np.sign(speed_m_s) or speed_m_s == 0.0
+
+
+@pytest.mark.parametrize("supply_bar", [2.0, 4.0, 4.9, 5.1, 9.0, 10.0])
+def test_the_points_of_a_shift_lie_between_the_air_and_any_supply_that_moves_the_piston(supply_bar):
+    """5 bar had been the point of charging at a supply of 4.9 bar too, which was refused for it."""
+    plant = PLANTS["gearbox"]().with_values({"supply.pressure_pa": supply_bar * BAR})
+    points, modes = shift_points(shift_model(plant)), standard_modes(plant).modes
+    air_pa = plant.values["atmosphere.pressure_pa"]
+
+    assert air_pa < points.venting_pa < points.charging_pa < supply_bar * BAR
+    for mode in modes[1:]:  # the first one is held at Neutral
+        for number, flow in enumerate(mode.command, 1):
+            assert flow and (flow > 0.0) == (f"{number} charges" in mode.name)
+    assert held_at_neutral(shift_model(plant)).state.tolist() == [points.charging_pa] * 2
+
+
+@pytest.mark.parametrize("supply_bar", [9.0, 10.0])
+def test_at_its_own_supply_and_above_the_points_of_a_shift_are_those_that_were_chosen(supply_bar):
+    plant = PLANTS["gearbox"]().with_values({"supply.pressure_pa": supply_bar * BAR})
+
+    for model in map(shift_model, (plant, plant.with_values({"atmosphere.pressure_pa": 0.8e5}))):
+        assert shift_points(model) == ShiftPoints(charging_pa=5e5, venting_pa=3e5)
+
+
+def test_the_points_of_a_shift_go_with_the_supply_that_a_recording_brings():
+    """What is measured takes the place of the parameter, which is then of no account."""
+    plant = PLANTS["gearbox"]().with_values({"supply.pressure_pa": 4e5})
+    recorded = plant.with_measured_input("supply.pressure_pa")
+
+    assert shift_points(shift_model(recorded)) == ShiftPoints()
 
 
 def test_where_a_mode_rests_is_looked_for_from_its_own_point_alone(monkeypatch):

@@ -79,6 +79,8 @@ class LoopRecord:
         Wall time of each controller step and each estimator update, shape (n_ticks,).
     notes
         What controller and estimator noted, by name, NaN where nothing, shape (n_ticks,).
+    fallback
+        Where the controller noted that it had no answer of its own and fell back, (n_ticks,).
     """
 
     recording: Recording
@@ -87,6 +89,7 @@ class LoopRecord:
     control_time_s: np.ndarray
     estimate_time_s: np.ndarray
     notes: Mapping[str, np.ndarray]
+    fallback: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
 
 def close_loop(
@@ -145,7 +148,9 @@ def close_loop(
             command = controller.step(command, looked, estimate)
             done = perf_counter()
             command = replace(command, value=hardware.sent(plant, command.value))
-            ticks.append((done - known, known - begun, {**estimate.notes, **command.notes}))
+            noted = {**estimate.notes, **command.notes}
+            own = command.notes.get("fallback", 0.0)  # an estimator may note one too
+            ticks.append((done - known, known - begun, noted, own))
         rows.append((command.value, x, y, seen, estimate.state))
         x = plant_step(x, command.value, k)
     return _record(plant, reference, sample_time_s, rows, ticks, estimate.names)
@@ -208,7 +213,7 @@ def _record(
     values = np.vstack([u, x, y])
     channels = dict(zip((*model.commands, *model.states, *model.measured), values, strict=True))
     channels |= {f"reference.{name}": row for name, row in reference.items()}
-    noted = {key for _, _, notes in ticks for key in notes}
+    noted = {key for tick in ticks for key in tick[2]}
     return LoopRecord(
         recording=Recording(plant.name, sample_time_s, channels, source="closed loop"),
         measured=seen,
@@ -216,4 +221,5 @@ def _record(
         control_time_s=np.array([tick[0] for tick in ticks]),
         estimate_time_s=np.array([tick[1] for tick in ticks]),
         notes={key: np.array([tick[2].get(key, np.nan) for tick in ticks]) for key in noted},
+        fallback=np.array([tick[3] > 0.0 for tick in ticks]),
     )

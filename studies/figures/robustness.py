@@ -20,14 +20,15 @@ COLUMNS = 3
 ROW_IN, LEGEND_IN = 1.8, 0.2
 MOST_PARAMETERS = 12  # in the map, the strongest
 LONG = 20  # letters of a line that does not fit below its column
+NOTHING_CLEAR = "no parameter clearly moves any figure"
 DARK = 0.6  # from there on the map is too dark for black letters
 
 
 def spread_figure(found: Robustness, limits: Mapping[str, float]) -> Figure:
     """Share of the draws up to each figure, one panel a line.
 
-    ``limits`` are by line, in its unit; draws that miss the line are marked on the axis.  One
-    legend tells of all panels.
+    ``limits`` are by line, in its unit; draws that miss the line, as its table counts them, are
+    marked on the axis.  One legend tells of all panels.
     """
     with styled():
         rows = -(-len(found.lines) // COLUMNS)
@@ -48,7 +49,10 @@ def spread_figure(found: Robustness, limits: Mapping[str, float]) -> Figure:
 
 
 def influence_figure(found: Robustness) -> Figure:
-    """Rank correlations of parameters with figures as a map, blank where nothing is clear."""
+    """Rank correlations of parameters with figures as a map, blank where nothing is clear.
+
+    With too few draws to tell, or none that is clear at all, words instead of the map.
+    """
     clear = {line.name: dict(found.influences(line)) for line in found.lines}
     strongest: dict[str, float] = {}
     for of_line in clear.values():
@@ -63,7 +67,7 @@ def influence_figure(found: Robustness) -> Figure:
             labels = [public_name(name) for name in names]
             _draw_map(axes, values, labels, [line.name for line in found.lines])
         else:
-            said = "no parameter clearly moves any figure"
+            said = f"influences: {found.unranked}" if found.unranked else NOTHING_CLEAR
             axes.text(0.5, 0.5, said, ha="center", va="center")
             axes.set_axis_off()
     return figure
@@ -73,7 +77,7 @@ def _draw_spread(axes: Axes, line: Line, limit: float | None) -> None:
     inside = np.sort(line.found[np.isfinite(line.found)])
     share = 100.0 * (1.0 + np.arange(len(inside))) / len(line.found)
     axes.step(inside, share, where="post", color=BLUE, label="share up to it")
-    missed = inside[limit < inside] if limit is not None else inside[:0]
+    missed = line.found[np.isfinite(line.found) & line.missed]
     if len(missed):  # an empty line that is not clipped would upset the layout
         look = {"color": RED, "markersize": 6, "clip_on": False}
         axes.plot(missed, np.zeros(len(missed)), "|", label="missed", **look)

@@ -2,7 +2,8 @@
 
 The horizons are those of :mod:`workbench.comparison.horizons`.
 
-Beside each error stands chi2/n against the measured noise, which is one where only noise is left.
+Beside each error stands chi2/n against the measured noise, which is one where only noise is left;
+one step ahead it is a little more, for what the filter does not know of the sample before.
 
 Source: diagnosis.md 1.1; the fit percent is that of System Identification:
 100 (1 - |y - yhat| / |y - mean y|).

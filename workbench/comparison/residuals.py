@@ -1,9 +1,9 @@
 """What is left of a signal: its spectrum, and whether it is white.
 
-The innovations of a one-step filter are white where plant and noise are right.  Then their
-autocorrelation stays within +-1.96/sqrt(n) in 95 % of all lags, n the pairs of samples so far
-apart, and their spectrum is flat, at 2 sigma^2 dt for one side.  Holes cost pairs, at long lags
-more than at short ones, so that each lag is a mean over its own.
+The innovations of a one-step filter are white where plant and noise are right, its process noise
+too.  Then their autocorrelation stays within +-1.96/sqrt(n) in 95 % of all lags, n the pairs of
+samples so far apart, and their spectrum is flat, at 2 sigma^2 dt for one side.  Holes cost pairs,
+at long lags more than at short ones, so that each lag is a mean over its own.
 
 Source: Ljung, System Identification, 2nd ed., 16.6 (residual analysis); Welch 1967 (spectrum).
 """
