@@ -3,8 +3,10 @@
 import pytest
 from recording_files import RIG, read, refused, table, text
 
+from workbench.fitting.unknowns import nominal_unknowns
 from workbench.reading.table import RecordingWarning
 from workbench.reading.text_table import BRACKETED
+from workbench.rig import AMBIENT, load_rig
 from workbench.spelled_units import is_gauge
 from workbench.units import STANDARD_ATMOSPHERE_PA, UnitError, quantity, scale
 
@@ -98,3 +100,15 @@ def test_no_unit_is_no_wonder(tmp_path, told):
 def test_brackets_of_a_unit_of_its_own_stay(word):
     """The last one was cut off, and the unit not understood."""
     assert BRACKETED.sub(r"\1", word) == "kg/(s Pa)"
+
+
+@pytest.mark.parametrize(("unit", "moved"), [("bar", True), ("bar_gauge", False), ("psig", False)])
+def test_a_fit_does_not_move_the_pressure_that_gauges_count_from(tmp_path, unit, moved):
+    """The fitted rig would read the same file otherwise than the fit did."""
+    path = tmp_path / "rig.toml"
+    path.write_text(rigged(unit))
+    rig = load_rig(path)
+
+    assert (AMBIENT not in rig.held) is moved
+    assert (AMBIENT in nominal_unknowns(rig.plant, rig.deviations, rig.held).names) is moved
+    assert rig.standard_deviation(AMBIENT) > 0.0

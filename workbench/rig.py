@@ -20,6 +20,7 @@ from workbench.recording_format import RecordingFormat, default_format, read_for
 from workbench.rig_laws import Ranges, is_law, law_terms, read_seen, with_laws
 from workbench.rig_names import parameter_names
 from workbench.rig_text import RigText, read_text
+from workbench.spelled_units import is_gauge
 from workbench.units import (
     STANDARD_ATMOSPHERE_PA,
     UnitError,
@@ -48,7 +49,7 @@ class Rig:
     deviations
         One standard deviation in SI by full parameter name, where it overrides the catalogue's.
     fixed
-        Full names of parameters that are never fitted.
+        Full names of parameters that are never fitted; see ``held``.
     reader
         How recordings are read.
     notes
@@ -78,6 +79,16 @@ class Rig:
     def ambient_pa(self) -> float:
         """The pressure that gauge pressures count from."""
         return self.plant.values.get(AMBIENT, STANDARD_ATMOSPHERE_PA)
+
+    @property
+    def held(self) -> frozenset[str]:
+        """Full names of what no fit moves: what is fixed, and what recordings were read with.
+
+        Gauge pressures were counted from the ambient pressure: a fit that moved it would leave them
+        where they are, and the fitted rig would read the same file otherwise.
+        """
+        gauges = any(is_gauge(each.unit) for each in self.reader.channels.values())
+        return self.fixed | {AMBIENT} if gauges else self.fixed
 
     def with_added(self, plant: Plant, names: Iterable[str]) -> Rig:
         """The rig with a plant in which more causes stand: free in a fit, and removed no longer."""

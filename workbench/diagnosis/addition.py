@@ -217,7 +217,7 @@ def apart(step: Addition) -> tuple[Addition, ...]:
 def _present(rig: Rig, plant: Plant, added: Sequence[Candidate], candidate: Candidate) -> bool:
     """True where the prior fit moves the cause already; no fit is needed to know."""
     lean = staged(plant, *(each.member for each in added))
-    moved = nominal_unknowns(lean, rig.deviations, rig.fixed, added).names
+    moved = nominal_unknowns(lean, rig.deviations, rig.held, added).names
     return candidate.held in moved or (
         candidate.strength in moved and not candidate.cause.tolerated
     )

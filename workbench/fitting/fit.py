@@ -88,10 +88,10 @@ def fit(
     require(only, plant.values, plant.name)
     if only:
         others = frozenset(name for name in plant.values if name not in only)
-        held = replace(rig, fixed=rig.fixed | others)
+        asked = replace(rig, fixed=rig.fixed | others)
     else:
-        held = rig
-    free = nominal_unknowns(plant, held.deviations, held.fixed, held.added_to(plant)).names
+        asked = rig
+    free = nominal_unknowns(plant, asked.deviations, asked.held, asked.added_to(plant)).names
     if not free:
         names = ", ".join(only) or "the plant"
         raise ValueError(f"nothing to fit: {names} is fixed or has no uncertainty in {rig.name}")
@@ -99,7 +99,7 @@ def fit(
     if proves_nothing(train, validation):
         warnings.warn(NO_EVIDENCE, stacklevel=2)
     progress("fit")
-    problem = pose(held, train, validation)
+    problem = pose(asked, train, validation)
     progress("the same by its own errors, what went far begun anew at its prior")
     own = begun_anew(by_own_errors(problem.base))
     problem = problem if own is problem.base else problem.with_base(own)

@@ -58,7 +58,7 @@ def identifiability(rig: Rig, train: Sequence[Recording]) -> Identifiability:
     whole = rig.fit_for(train[0])
     added = rig.added_to(whole)
     plant = staged(whole, *(c.member for c in added))
-    unknowns = nominal_unknowns(plant, rig.deviations, rig.fixed, added)
+    unknowns = nominal_unknowns(plant, rig.deviations, rig.held, added)
     if not len(unknowns):
         return Identifiability((), np.zeros(0), 0)
     noise = measured_noise(train, plant.measured)

@@ -64,7 +64,7 @@ class Problem:
     def unknowns(self, plant: Plant, *more: Candidate) -> Unknowns:
         """What a fit of a plant may move, with more causes added."""
         added = (*self.added, *more)
-        return nominal_unknowns(plant, self.rig.deviations, self.rig.fixed, added, self.believed)
+        return nominal_unknowns(plant, self.rig.deviations, self.rig.held, added, self.believed)
 
     def validated(self, fit: Fit) -> Fit | None:
         """A fitted plant on the held-out windows, only start states refitted."""
@@ -187,7 +187,7 @@ def pose(
     noise = measured_noise(train, plant.measured)
     length_s = window_length_s(plant, train, validation)
     windows = cut_windows(plant, train, noise, length_s, most_windows)
-    unknowns = nominal_unknowns(plant, rig.deviations, rig.fixed, added, believed)
+    unknowns = nominal_unknowns(plant, rig.deviations, rig.held, added, believed)
     progress(f"prior fit of {len(unknowns)} parameters to {len(windows)} windows")
     first = fitted_twice(windows, unknowns, unknowns.scaled(plant.values))
     progress("prior fit weighed by its own errors")

@@ -199,7 +199,7 @@ def enough_samples(rig: Rig, recordings: Sequence[Recording], only: Sequence[str
     """
     plant = rig.plant
     added = rig.added_to(plant)
-    free = only or nominal_unknowns(plant, rig.deviations, rig.fixed, added).names
+    free = only or nominal_unknowns(plant, rig.deviations, rig.held, added).names
     samples = sum(map(len, recordings))
     if samples < len(free):
         what = f"{samples} samples are fewer than the {len(free)} parameters of {plant.name}"
