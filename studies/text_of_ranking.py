@@ -19,10 +19,7 @@ from workbench.effect import Kind
 
 SHOWN_RANKS = 12
 DROPS = "drop: share of the weighted misfit beyond noise that goes away, on either set"
-TIES = (
-    "tie: led by what leaves least of both sets where parameters stay near their priors, "
-    "or clearly least of the validation"
-)
+TIES = "tie: led by what leaves least of both sets where parameters stay near their priors"
 
 
 def ranking_text(found: Diagnosis) -> str:

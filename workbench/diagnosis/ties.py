@@ -14,12 +14,10 @@ from workbench.diagnosis.judge import (
     left_held_out,
     predicts,
     reasons_against,
-    share_removed,
 )
 from workbench.diagnosis.near_priors import left_near_priors
-from workbench.diagnosis.refit import Refit, surplus
+from workbench.diagnosis.refit import Refit
 from workbench.diagnosis.scan import Profile
-from workbench.diagnosis.size import DISTINCT
 from workbench.fitting.problem import Problem
 
 LARGEST_TIE = 3
@@ -99,20 +97,7 @@ def _far_worse(other: Refit, best: Refit) -> bool:
 def _leader(problem: Problem, effects: Sequence[Refit], left: Left) -> Refit:
     """Which of the tied leads; see :func:`tie_group`."""
     may_lead = [each for each in effects if predicts(each)] or effects
-    if len(may_lead) == 1:
-        return may_lead[0]
-    leader = min(may_lead, key=lambda each: left(problem, each))
-    closest = min(may_lead, key=left_held_out)
-    leader = closest if _told_apart_held_out(closest, leader) else leader
-    return next((each for each in may_lead if _leans_on(leader, each)), leader)
-
-
-def _told_apart_held_out(one: Refit, other: Refit) -> bool:
-    """True where one leaves clearly less held out, by more than chance among windows explains."""
-    if one.validation is None or other.validation is None:
-        return False
-    clearly = clearly_less(left_held_out(one), left_held_out(other))
-    return clearly and surplus(one.validation, other.validation) > DISTINCT
+    return min(may_lead, key=lambda each: left(problem, each)) if may_lead[1:] else may_lead[0]
 
 
 def _refused_by_few(other: Refit, best: Refit) -> bool:
@@ -125,21 +110,6 @@ def _refused_by_few(other: Refit, best: Refit) -> bool:
         return False
     more = leaves_clearly_less(other.drop_train, best.drop_train)
     return more and not clearly_less(left_held_out(best), left_held_out(other))
-
-
-def _leans_on(leader: Refit, other: Refit) -> bool:
-    """True where a leader needs more of another than is usual, and leaves hardly less than it.
-
-    A command delay of two milliseconds is in every fit: a tube that needs more than that, and makes
-    the commands later still, is one more cause for what a longer delay explains alone.
-    """
-    name, unknowns = other.candidate.strength, leader.fit.unknowns
-    if other is leader or not other.candidate.cause.tolerated or name not in unknowns.names:
-        return False
-    usual = leader.fit.point.t[unknowns.names.index(name)] < 1.0
-    sides = ((1.0 - share_removed(each), left_held_out(each)) for each in (leader, other))
-    ours, theirs = ([max(left, LITTLE_LEFT) for left in each] for each in sides)
-    return not usual and not any(map(clearly_less, ours, theirs))
 
 
 def _alignment_of(one: Refit, other: Refit, profiles: Mapping[str, Profile]) -> float:
