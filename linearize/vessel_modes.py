@@ -13,10 +13,11 @@ import numpy as np
 
 from linearize.axes import DRIVE
 from linearize.cuts import Interval, Region
-from linearize.equilibrium import OperatingPoint, operating_point
+from linearize.equilibrium import NoOperatingPointError, OperatingPoint, operating_point
 from linearize.modes import Box, HybridModel, hybrid_modes
 from linearize.reduction import DesignModel, LeftOut, closed_command, design_model
 from linearize.regimes import flow_regimes
+from linearize.valve_sample import AMBIENT, SUPPLY
 from workbench.plant import Plant
 from workbench.plants.servo_reservoir import PRESSURE as TANK
 from workbench.plants.soft_joint import COMMAND as PWM
@@ -76,7 +77,14 @@ def filling_modes(plant: Plant, filling: Filling) -> HybridModel:
 
     The points lie in the middle of each regime: filling and venting end only where the pressure
     meets the supply's or the atmosphere's.
+
+    Raises
+    ------
+    NoOperatingPointError
+        If the supply is not above the atmosphere: there is nothing between to fill.
     """
+    if plant.values.get(SUPPLY, inf) <= plant.values.get(AMBIENT, 0.0):
+        raise NoOperatingPointError(f"{plant.name}: the supply is not above the atmosphere")
     model, modes = design_model(plant), []
     for valve in filling.valve_cut():
         cuts: dict[str, tuple[Region, ...]] = {filling.command: (valve,)}

@@ -253,7 +253,8 @@ def _line_of(verdict: Verdict, name: str) -> Line:
     """A line as its figure in the typed unit; of one with two ends, how far beyond them."""
     asked, found = verdict.asked, np.array(verdict.found)
     if _two_sided(verdict):
-        name, values = f"{name}, beyond", [asked.excess(v) / asked.scale.factor for v in found]
+        beyond = [min(asked.excess(v), 0.0 if asked.allows(v) else inf) for v in found]
+        name, values = f"{name}, beyond", np.array(beyond) / asked.scale.factor
     else:
         values = asked.scale.from_si(np.where(np.isfinite(found), np.abs(found), inf))
     return Line(name, asked.text, np.array(values), ~np.array(verdict.met), asked.unit)

@@ -156,6 +156,18 @@ def test_a_supply_at_ambient_pressure_is_refused_in_words_of_the_project(supply_
         slide_modes(plant.with_values(values))
 
 
+@pytest.mark.parametrize("plant", ["soft_joint", "servo_reservoir"])
+def test_a_vessel_is_not_filled_from_below_the_atmosphere(tmp_path, plant):
+    weak = tmp_path / "weak.toml"
+    weak.write_text(f'plant = "{plant}"\n[values]\n"supply.pressure" = "0.5 bar"\n')
+    answer = call("modes", weak, "-q")
+    (line,) = answer.stderr.splitlines()
+
+    assert answer.exit_code == 2
+    assert line.startswith("workbench: supply.pressure: 0.5 bar is too low to move: ")
+    assert "the supply is not above the atmosphere; expected more, as " in line
+
+
 def test_a_point_that_is_missing_for_another_reason_is_not_blamed_on_the_supply(monkeypatch):
     def stuck(plant):
         raise NoOperatingPointError("servo_drive: no operating point at all")

@@ -53,7 +53,7 @@ def test_of_a_plant_that_is_right_hardly_more_than_noise_is_missed(drive, record
 
 def test_a_filter_that_has_lost_the_state_says_so(recording, drive, monkeypatch):
     """Neither the filter nor the careful one: both are a million times too sure of their start."""
-    monkeypatch.setattr(horizons, "PROCESS_SHARES", (1e-9,))
+    monkeypatch.setattr(horizons, "PROCESS_SHARE", 1e-9)
     off = recording[POSITION].copy()
     off[:3] += 0.02
     off = replace(recording, channels={**recording.channels, POSITION: off})
@@ -133,7 +133,7 @@ def test_a_filter_at_the_noise_of_a_good_sensor_has_lost_nothing(plant_name, mon
     """
     rig, played = own_simulation(plant_name, 3e-4)
     (likeliest,) = compare(rig, [played]).recordings
-    monkeypatch.setattr(horizons, "PROCESS_SHARES", horizons.PROCESS_SHARES[:1])
+    monkeypatch.setattr(horizons, "SMALLER_SHARES", ())
     (found,) = compare(rig, [played]).recordings
 
     (name,) = found.errors[ONE_STEP]
@@ -167,7 +167,7 @@ def followed(rig, recording, monkeypatch, *passes, free_off=0.0):
     """
     course = course_of(rig.plant, recording)
     asked = Passes(*passes)
-    monkeypatch.setattr(horizons, "PROCESS_SHARES", (0.1,))
+    monkeypatch.setattr(horizons, "SMALLER_SHARES", ())
     monkeypatch.setattr(horizons, "filter_pass", asked)
     free = {name: recording[name] + free_off * recording.noise[name] for name in rig.plant.measured}
     return *horizons._followed(course, recording.noise, free), asked.considered
@@ -224,13 +224,29 @@ def test_a_filter_no_further_off_than_a_free_run_is_not_at_fault(shift, monkeypa
 
 
 def test_process_noise_falls_as_long_as_likelihood_rises(shift, monkeypatch):
-    passes = [passed(*shift, 1.0, likely) for likely in (-3.0, -1.0, -2.0)]
-    monkeypatch.setattr(horizons, "filter_pass", Passes(*passes))
     rig, recording = shift
-    known, found = horizons._likeliest(course_of(rig.plant, recording), recording.noise)
-    loose = horizons._filter(course_of(rig.plant, recording), recording.noise, 0.1)
-
-    assert found is passes[1]
-    assert known.process_noise == pytest.approx(
-        {name: 0.1 * each for name, each in loose.process_noise.items()}
+    course = course_of(rig.plant, recording)
+    first, *smaller = (passed(rig, recording, 1.0, likely) for likely in (-3.0, -1.0, -2.0, 0.0))
+    asked = []
+    monkeypatch.setattr(
+        horizons, "filter_pass", lambda known, *_: asked.append(known) or smaller.pop(0)
     )
+    known = horizons._filter(course, recording.noise)
+    best = smaller[0]
+
+    assert horizons._surer(course, known, first) is best
+    shares = [each.process_noise[name] / known.process_noise[name] for each in asked
+              for name in list(known.process_noise)[:1]]  # fmt: skip
+    assert shares == pytest.approx([0.1, 0.01])
+
+
+def test_a_filter_that_went_astray_is_judged_before_it_is_made_surer(shift, monkeypatch):
+    """With less process noise it may seem no worse than it expects, where the careful one is."""
+    rig, recording = shift
+    lost, well = (passed(*shift, off, likely) for off, likely in ((30.0, -1e6), (1.0, 1e4)))
+    asked = Passes(lost, well)
+    monkeypatch.setattr(horizons, "filter_pass", asked)
+    free = {name: recording[name] for name in rig.plant.measured}
+    found, _ = horizons._followed(course_of(rig.plant, recording), recording.noise, free)
+
+    assert found is well and len(asked.considered) == 2

@@ -96,6 +96,17 @@ def test_windows_that_follow_one_another_are_wrong_alike(plant):
     assert one_by_one < 0.7 * whole
 
 
+def test_neighbours_that_differ_by_chance_make_nothing_surer(plant):
+    """Of few windows the products with the next may well come out negative."""
+    fits = [fitted(plant, 0.0, np.random.default_rng(k), windows_each=2) for k in range(4)]
+    firsts = ((0,),) * len(fits[0].windows)
+    alone = [replace(fit, windows=replace(fit.windows, firsts=firsts)) for fit in fits]
+    told, one_by_one = ([both_deviations(fit)[0] for fit in each] for each in (fits, alone))
+
+    assert np.all(np.array(told) >= np.array(one_by_one))
+    assert np.any(np.array(told) == np.array(one_by_one))
+
+
 def of_recordings(fit):
     """Standard deviation of the mass where the errors of a recording go together."""
     normal = _normal(fit)

@@ -106,6 +106,23 @@ def test_a_rival_that_a_few_held_out_windows_refuse_stays_in_the_tie(problem, fo
         assert group[0] == leader.candidate
 
 
+@pytest.mark.parametrize(
+    ("plain", "chance", "passes"),
+    [
+        (1.01, 0.0, True),  # rounding
+        (1.09, 0.0, False),  # every window is worse
+        (1.09, 0.23, True),  # of one break-away, on the stored truth piston_leak:2
+        (1.30, 0.50, False),  # whoever looks sees that
+    ],
+)
+def test_a_plain_error_that_grows_a_little_by_chance_among_windows_refuses_nothing(
+    problem, sound, plain, chance, passes
+):
+    found = replace(sound, plain_validation=plain, plain_chance=chance)
+
+    assert (HELD_OUT_REASON not in reasons_against(problem.base, found)) is passes
+
+
 def test_what_the_held_out_recording_refuses_leads_nothing_that_it_does_not(
     problem, followed, sound
 ):

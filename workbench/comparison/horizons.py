@@ -1,9 +1,9 @@
 """What a plant foretells of a recording, over three horizons, because positions integrate.
 
 one step    innovations of the extended Kalman filter: what is missed within one sample; where that
-            is worse than a free run, of a filter that corrects what is measured alone.  How far its
-            states stray from the plant's equations is the likeliest of a few shares of their scale:
-            small where the plant is right, and innovations are then little more than noise
+            is worse than a free run, of a filter that corrects what is measured alone; else with
+            less process noise as long as that is likelier, so that of a plant that is right
+            innovations are little more than noise
 window      short stretches with free start states, as a fit has them
             (:mod:`workbench.fitting.window_length`): forces and flows stay visible, drift is cut
 free run    the whole recording from its first sample: what a user of a simulation feels
@@ -39,7 +39,8 @@ from workbench.simulation import simulate
 
 ONE_STEP, WINDOW, FREE_RUN, PLAIN = "one step", "window", "free run", "sample by sample"
 JUDGED = (WINDOW, PLAIN, FREE_RUN, ONE_STEP)  # the first there is tells where the error is
-PROCESS_SHARES = (0.1, 0.01, 1e-3, 1e-4)  # of a state's scale per root of a second, falling
+PROCESS_SHARE = 0.1  # of a state's scale per square root of a second, in the one-step filter
+SMALLER_SHARES = (0.1, 0.01, 1e-3)  # of that, which a plant that is right is likelier with
 FARTHER = 1.5  # times the squared error of a free run
 UNEXPECTED = 4.0  # times the variance that the filter expects of its own innovations
 ASTRAY = "one step: the filter is further off than a free run: it has lost the state"
@@ -106,27 +107,29 @@ def _followed(
     course: Course, noise: Mapping[str, float], free: Rows | None
 ) -> tuple[FilterResult, list[str]]:
     """The filter over the recording, and in words where the careful one goes astray too."""
-    recording = course.recording
-    whole, filtered = _likeliest(course, noise)
+    recording, known = course.recording, _filter(course, noise)
+    filtered = filter_pass(known, recording, course.states)
     if not free or not _astray(recording, filtered, free):
-        return filtered, []
-    careful = replace(whole, considered=beside_measured(course.plant))
-    if (careful.corrected != whole.corrected).any():
+        return _surer(course, known, filtered), []
+    careful = replace(known, considered=beside_measured(course.plant))
+    if (careful.corrected != known.corrected).any():
         other = filter_pass(careful, recording, course.states)
-        filtered = max(filtered, other, key=_likely)
+        known, filtered = max(
+            (known, filtered), (careful, other), key=lambda each: _likely(each[1])
+        )
     return filtered, [ASTRAY] if _astray(recording, filtered, free) else []
 
 
-def _likeliest(course: Course, noise: Mapping[str, float]) -> tuple[PlantFilter, FilterResult]:
-    """The filter with the likeliest process noise, going down as long as likelihood rises."""
-    found = None
-    for share in PROCESS_SHARES:
-        tried = _filter(course, noise, share)
+def _surer(course: Course, known: PlantFilter, filtered: FilterResult) -> FilterResult:
+    """What a filter gives with ever less process noise, as long as likelihood rises."""
+    for share in SMALLER_SHARES:
+        process = {name: share * noise for name, noise in known.process_noise.items()}
+        tried = replace(known, process_noise=process)
         passed = filter_pass(tried, course.recording, course.states)
-        if found and not _likely(passed) > _likely(found[1]):
+        if not _likely(passed) > _likely(filtered):
             break
-        found = tried, passed
-    return found
+        filtered = passed
+    return filtered
 
 
 def beside_measured(plant: Plant) -> tuple[str, ...]:
@@ -156,7 +159,7 @@ def _likely(filtered: FilterResult) -> float:
     return likely if np.isfinite(likely) else -np.inf
 
 
-def _filter(course: Course, noise: Mapping[str, float], share: float) -> PlantFilter:
+def _filter(course: Course, noise: Mapping[str, float]) -> PlantFilter:
     """The filter of a recording.
 
     It starts where the recording is: from the plant's own initial state a link or a stop
@@ -167,7 +170,7 @@ def _filter(course: Course, noise: Mapping[str, float], share: float) -> PlantFi
         plant,
         recording,
         measurement_noise=noise,
-        process_noise=dict(zip(plant.model.states, share * plant.scale, strict=True)),
+        process_noise=dict(zip(plant.model.states, PROCESS_SHARE * plant.scale, strict=True)),
         initial_deviation=dict(zip(plant.model.states, course.deviations[:, 0], strict=True)),
     )
 

@@ -8,16 +8,16 @@ word, and may predict what it never saw worse than one that stayed near the prio
 the lowest of several valleys, and which one that is hangs on next to nothing.
 
 So each rival is fitted once more with its likelihood to the power 1/400, which is to say with
-deviations of priors a twentieth as wide as the catalogue's, by way of a quarter.  What counts is
+deviations of priors a twentieth as wide, by way of a quarter.  What counts is
 
     min over p, X0 of  chi2 + 400 |(p - p0) / s_p|^2 + |(x0 - guess) / s_x|^2   in training,
 
 with p the nuisances, and the squared error on what is held out with them, no window counted too
-much.  The deviations s_p have the ratios of the rig's own, and in the median the width of the
-catalogue's: which of two rivals a plant has does not hang on how sure a user is of all parameters
-alike, and priors of 15 % in place of 5 % would let them bend three times as far.  What has no
-prior, as the size of the rival itself, stays free, and what is tolerated in every fit, as a few
-milliseconds of delay, keeps the width that it is tolerated to.
+much.  The deviations s_p are those of the rig, in the median no wider than the catalogue's: which
+of two rivals a plant has does not hang on how unsure a user is of all parameters alike, and priors
+of 15 % in place of 5 % would let them bend three times as far.  What has no prior, as the size of
+the rival itself, stays free, and what is tolerated in every fit, as a few milliseconds of delay,
+keeps the width that it is tolerated to.
 
 The power is chosen: of thousands of effective samples as many say something of their own as the
 plant has small things of its own.  A tenth of the width orders the ties of study ``hidden-effects``
@@ -43,7 +43,7 @@ from workbench.fitting.problem import Problem
 from workbench.fitting.pulled_in import towards_priors
 from workbench.fitting.unknowns import Unknowns
 
-STAGES = (0.25, 0.05)  # widths of priors, of their own
+STAGES = (0.25, 0.05)  # widths of priors, of their own or of what is usual
 SHARES = (1.0, 0.3, 0.0)  # of the way that the nuisances have gone, to begin from
 
 
@@ -64,22 +64,22 @@ def left_near_priors(problem: Problem, rival: Refit) -> float:
 
 
 def hardly_moving(fit: Fit, nearer: float) -> Unknowns:
-    """The unknowns of a fit with priors ``nearer`` times as wide; see the module for which.
-
-    That is so many times the catalogue's width, and never wider than what the rig believes.
-    """
+    """The unknowns of a fit with priors ``nearer`` times as wide; see the module for which."""
     unknowns, candidates = fit.unknowns, fit.windows.plant.candidates.values()
     usual = {each.strength for each in candidates if each.cause.tolerated}
     held = unknowns.with_prior & [name not in usual for name in unknowns.names]
-    width = min(nearer / _wider_than_usual(fit, held), 1.0)
+    width = nearer / _wider_than_usual(fit, held)
     precision = np.where(held, unknowns.precision / width**2, unknowns.precision)
     return replace(unknowns, precision=precision)
 
 
 def _wider_than_usual(fit: Fit, held: np.ndarray) -> float:
-    """How many times as wide as the catalogue's the priors in ``held``, (n_p,), are, the median."""
+    """How many times as wide as the catalogue's the priors in ``held``, (n_p,), are, the median.
+
+    At least 1: what is known better than usual tells nothing of what is not.
+    """
     unknowns, known = fit.unknowns, fit.windows.plant.parameters
     priors = zip(unknowns.names, unknowns.prior, strict=True)
     usual = np.array([known[name].standard_deviation(value) for name, value in priors])
     held = held & (usual > 0.0)
-    return float(np.median(unknowns.scale[held] / usual[held])) if held.any() else 1.0
+    return max(float(np.median(unknowns.scale[held] / usual[held])), 1.0) if held.any() else 1.0

@@ -44,14 +44,11 @@ def tie_group(
     windows.  Among the tied those that pass every criterion come first, effects before parameters
     that would lie far off what is known of them, and among these the one leads with the
     least ``left`` of both recordings together, where nuisances may hardly bend for any: either
-    recording alone orders rivals by what its few events happen to show.  But where one leaves at
-    least a fifth less of the held-out misfit, and not in a few windows alone, that recording
-    decides.  And where the leader needs more than is usual of one that is always there and leaves
-    hardly less than that one, the other leads.  Those that look most like the leader stand next to
+    recording alone orders rivals by what its few events happen to show, and where nuisances are
+    free, what is left tells how far they bent.  Those that look most like the leader stand next to
     it: were it wrong, it would stand for one of them.
 
-    Source: diagnosis.md 1.6; Vuong 1989, "Likelihood ratio tests for model selection and non-nested
-    hypotheses", for what chance explains.
+    Source: diagnosis.md 1.6.
     """
     tied = _close(refits, profiles)
     against = {id(each): bool(reasons_against(problem.base, each)) for each in tied}

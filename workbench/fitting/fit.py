@@ -94,7 +94,9 @@ def fit(
     free = nominal_unknowns(plant, asked.deviations, asked.held, asked.added_to(plant)).names
     if not free:
         names = ", ".join(only) or "the plant"
-        raise ValueError(f"nothing to fit: {names} is fixed or has no uncertainty in {rig.name}")
+        counted = set(only) & (rig.held - rig.fixed)
+        why = "is what gauge pressures count from" if counted else "is fixed or has no uncertainty"
+        raise ValueError(f"nothing to fit: {names} {why} in {rig.name}")
     train, validation = checked(rig, train, validation)
     if proves_nothing(train, validation):
         warnings.warn(NO_EVIDENCE, stacklevel=2)

@@ -66,9 +66,10 @@ def both_deviations(
 
     with g_w the gradient of each of the n windows, Lambda the weights of the prior and k_l from 1
     down to 0 over a few windows either way within a recording: what a plant has otherwise is alike
-    in windows that follow one another.  The larger of the two is told, and no more than the prior.
-    What all windows have wrong alike neither tells.  One that the fit holds at a bound has none,
-    NaN.
+    in windows that follow one another.  The largest is told, of the curvature's, of this and of it
+    without neighbours, and no more than the prior: of few windows a product with the next may come
+    out below nothing by chance.  What all windows have wrong alike none tells.  One that the fit
+    holds at a bound has none, NaN.
 
     The curvature's deviation of a strength is that with the forms held that it is ``shaped_by``:
     where the strength is none no form can be known, so one that is hardly known says nothing of
@@ -88,7 +89,8 @@ def both_deviations(
     known = np.where(normal.precision > 0.0, known, np.nan)
     most = np.fmax(1.0 / np.sqrt(np.maximum(prior, 1e-300)), known)
     pulls = _pulls(normal, [len(firsts) for firsts in fit.windows.firsts])
-    told = np.clip(np.sqrt(np.diag(inverse @ pulls @ inverse)), known, most)
+    spread = [np.sqrt(np.diag(inverse @ each @ inverse)) for each in pulls]
+    told = np.clip(np.max(spread, axis=0), known, most)
     for name, forms in shaped_by.items():
         k = fit.unknowns.names.index(name)
         known[k] *= _share_held(normal.hessian, inverse, k, [*map(fit.unknowns.names.index, forms)])
@@ -103,20 +105,24 @@ def _share_held(hessian: np.ndarray, inverse: np.ndarray, k: int, forms: list[in
     return float(np.sqrt(held[place, place] / inverse[k, k]))
 
 
-def _pulls(normal: Normal, counts: Sequence[int]) -> np.ndarray:
+def _pulls(normal: Normal, counts: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
     """Covariance of the gradient, of the windows as they differ and of the prior, (n_p, n_p).
 
-    ``counts`` are windows of each recording, one after the other.
+    Of windows one by one, and with their neighbours.  ``counts`` are windows of each recording, one
+    after the other.
     """
     by_window = np.einsum("wrp,wr->wp", normal.derivatives, normal.residual)
     n = len(by_window)
     lags = int(4.0 * (n / 100.0) ** (2.0 / 9.0))  # Newey and West 1994, for Bartlett's weights
-    pulls = by_window.T @ by_window
+    alone = by_window.T @ by_window
+    pulls = alone.copy()
     for own in np.split(by_window, np.cumsum(counts)[:-1]):
         for lag in range(1, min(lags, len(own) - 1) + 1):
             both = own[lag:].T @ own[:-lag]
             pulls += (1.0 - lag / (lags + 1.0)) * (both + both.T)
-    return n / max(n - 1, 1) * pulls + np.diag(normal.precision)
+    prior = np.diag(normal.precision)
+    alone, pulls = (n / max(n - 1, 1) * each + prior for each in (alone, pulls))
+    return alone, pulls
 
 
 def posterior_covariance(fit: Fit) -> np.ndarray:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import t as student
 
 from workbench.errors import InputError, Message
 from workbench.fitting.starts import guessed_states
@@ -16,7 +17,7 @@ from workbench.recording import Recording
 STEADY_V = 0.02  # a command that stays within is constant
 LEAST_LEAD = 5  # samples with the valve still closed
 LEAD_S = 0.1  # before the opening: so far back a straight line is taken through the pressure
-DRIFTS = 2.0  # standard deviations of its slope from which on that is none of noise
+DRIFTS = 0.05  # chance at which noise alone would slope as much: below, it is a drift
 LEAST_SAMPLES = 30
 CLEARLY_V = 0.2  # that far outside the dead zone a path is open
 LEAST_RISE = 0.1  # of supply minus ambient, with an open path
@@ -78,7 +79,9 @@ def _piece(tank: TankOnValve, recording: Recording) -> Piece:
     charging = command_v >= centre_v
     is_open = abs(command_v - centre_v) > half_v + CLEARLY_V
     lead = recording.part(0, max(opened, LEAST_LEAD))
-    start_pa = _at_the_opening(lead[plant.measured[0]], lead.sample_time_s)
+    before_pa = lead[plant.measured[0]]
+    never_pa = float(np.mean(before_pa))  # where it stays closed the curve begins with the lead
+    start_pa = _at_the_opening(before_pa, lead.sample_time_s) if opened else never_pa
     if is_open:
         _check_open(tank, rest, start_pa, charging)
     pressure = rest[plant.measured[0]]
@@ -118,7 +121,8 @@ def _at_the_opening(lead_pa: np.ndarray, sample_time_s: float) -> float:
     near = lead_pa[-max(round(LEAD_S / sample_time_s), LEAST_LEAD) :]
     before = np.arange(len(near)) - len(near)
     (slope, end_pa), covariance = np.polyfit(before, near, 1, cov=True)
-    drifts = abs(slope) > DRIFTS * np.sqrt(covariance[0, 0])
+    clear = student.isf(DRIFTS / 2.0, len(near) - 2)
+    drifts = abs(slope) > clear * np.sqrt(covariance[0, 0])
     return float(end_pa if drifts else near.mean())
 
 
