@@ -19,7 +19,10 @@ from workbench.effect import Kind
 
 SHOWN_RANKS = 12
 DROPS = "drop: share of the weighted misfit beyond noise that goes away, on either set"
-TIES = "tie: led by what leaves least of both sets where parameters stay near their priors"
+TIES = (
+    "tie: led by what leaves least of both sets where parameters stay near their priors, "
+    "or clearly least of the validation"
+)
 
 
 def ranking_text(found: Diagnosis) -> str:

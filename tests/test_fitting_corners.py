@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from workbench.diagnosis.ranking import _reason_not_asked
-from workbench.diagnosis.refit import bounded_error
+from workbench.diagnosis.refit import bounded_error, surplus
 from workbench.diagnosis.rough import with_shape
 from workbench.diagnosis.scan import sizes_to_try
 from workbench.fitting.errors import plain_chance, plain_ratio
@@ -51,6 +51,10 @@ def test_a_plain_error_that_hangs_on_one_window_is_known_no_better_than_that_win
     assert plain_chance(before, alike) == pytest.approx(0.0, abs=1e-12)
     assert plain_chance(errors(1.0, windows=1), errors(2.0, windows=1)) == 0.0
     assert np.isnan(plain_chance(before, None))
+
+
+def test_one_held_out_window_says_nothing_of_chance():
+    assert surplus(errors(0.5, windows=1), errors(0.6, windows=1)) == 0.0
 
 
 def test_a_held_out_window_counts_no_more_than_an_outlying_one_of_its_recorded_samples():

@@ -9,7 +9,7 @@ from test_judgement import BARE, HELD_OUT, TRAIN
 
 from workbench.diagnosis.diagnose import silent
 from workbench.diagnosis.follow import follow
-from workbench.diagnosis.near_priors import hardly_moving, left_near_priors
+from workbench.diagnosis.near_priors import hardly_moving, left_of_both, near_priors
 from workbench.diagnosis.ties import tie_group
 from workbench.fitting.gauss_newton import fit_windows
 from workbench.fitting.problem import pose
@@ -40,6 +40,10 @@ def believing(rival, deviations):
     prior = fit.unknowns.prior - np.where(known, deviations, 0.0) * scale
     unknowns = replace(fit.unknowns, prior=prior, scale=scale)
     return replace(rival, fit=fit_windows(fit.windows, unknowns, fit.point))
+
+
+def left_near_priors(problem, rival):
+    return left_of_both(near_priors(problem, rival))
 
 
 def test_it_is_the_least_of_a_likelihood_to_a_power_far_below_one(problem, sound):

@@ -177,6 +177,36 @@ def test_four_that_cannot_be_told_apart_are_no_tie_but_a_recording_too_weak(
     assert imitation(own, replace(own, signature=-own.signature)) == 0.0
 
 
+@pytest.mark.parametrize(
+    ("every", "near", "leads"),
+    [(1, True, 1), (50, True, 0), (1, False, 0)],
+    ids=["all windows", "one window", "free alone"],
+)
+def test_the_held_out_recording_decides_a_tie_by_more_than_a_few_windows(
+    problem, followed, sound, every, near, leads
+):
+    """A fifth less is clear where windows agree; one break-away may be all that a rival hits.
+
+    And where nuisances hardly move too: free they may have bent for what was fitted alone.
+    """
+    held_out = sound.validation
+    better = np.arange(len(held_out.windows)) % every == 0
+    residual = np.where(better[:, None], 0.5, 1.0) * held_out.derivatives.residual
+    closer = replace(held_out, derivatives=replace(held_out.derivatives, residual=residual))
+    first = replace(named(sound, followed, 0), drop_train=0.95, drop_validation=0.60)
+    other = replace(named(sound, followed, 1), drop_train=0.80, drop_validation=0.70)
+    rivals = [first, replace(other, validation=closer)]
+    cheaper = replace(first, fit=replace(first.fit, cost=first.fit.cost - 1e3))
+    nearer = {
+        first.candidate.name: cheaper,
+        other.candidate.name: rivals[1] if near else replace(first, candidate=other.candidate),
+    }
+    group = tie_group(problem, rivals, {}, lambda _, each: nearer[each.candidate.name])
+
+    assert len(group) == 2
+    assert group[0] is rivals[leads]
+
+
 @pytest.mark.parametrize(("left", "leads"), [((7.0, 8.0), 0), ((8.0, 7.0), 1)])
 @pytest.mark.parametrize("held_out", [(0.4, 0.4), (0.4, 0.7)], ids=["alike", "the other predicts"])
 def test_of_the_tied_the_one_leads_that_leaves_least_near_the_priors(
@@ -187,8 +217,13 @@ def test_of_the_tied_the_one_leads_that_leaves_least_near_the_priors(
         replace(named(sound, followed, k), drop_train=train, drop_validation=unseen)
         for k, (train, unseen) in enumerate(zip((0.70, 0.68), held_out, strict=True))
     ]
-    leaves = {r.candidate.name: share for r, share in zip(rivals, left, strict=True)}
-    group = tie_group(problem, rivals, {}, lambda _, each: leaves[each.candidate.name])
+    costs = {r.candidate.name: cost for r, cost in zip(rivals, left, strict=True)}
+    group = tie_group(
+        problem,
+        rivals,
+        {},
+        lambda _, each: replace(each, fit=replace(each.fit, cost=costs[each.candidate.name])),
+    )
 
     assert len(group) == 2
     assert group[0] is rivals[leads]

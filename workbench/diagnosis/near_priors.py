@@ -34,7 +34,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from workbench.diagnosis.refit import ITERATIONS, Refit, bounded_error
+from workbench.diagnosis.refit import ITERATIONS, Refit, bounded_error, counted_from
 from workbench.fitting.continued import continued
 from workbench.fitting.costs import points_costs
 from workbench.fitting.gauss_newton import Fit, fit_windows
@@ -47,8 +47,8 @@ STAGES = (0.25, 0.05)  # widths of priors, of their own or of what is usual
 SHARES = (1.0, 0.3, 0.0)  # of the way that the nuisances have gone, to begin from
 
 
-def left_near_priors(problem: Problem, rival: Refit) -> float:
-    """Cost of a rival in both recordings near the priors; see the module's equation.
+def near_priors(problem: Problem, rival: Refit) -> Refit:
+    """The same rival, fitted and validated where nuisances hardly move; see the module.
 
     Each stage begins where the one before ended, or nearer to the priors, as costs less.
     """
@@ -59,8 +59,13 @@ def left_near_priors(problem: Problem, rival: Refit) -> float:
         begun = points_costs(windows, unknowns, points).best
         fit = fit_windows(windows, unknowns, begun, ITERATIONS)
     fit = continued(fit, ITERATIONS)
-    held_out = problem.validated(fit)
-    return fit.cost + (bounded_error(held_out) if held_out else 0.0)
+    found = replace(rival, fit=fit, validation=problem.validated(fit))
+    return counted_from(problem.base, problem.base_validation, found)
+
+
+def left_of_both(near: Refit) -> float:
+    """Cost in training and squared error held out, no window counted too much there."""
+    return near.fit.cost + (bounded_error(near.validation) if near.validation else 0.0)
 
 
 def hardly_moving(fit: Fit, nearer: float) -> Unknowns:

@@ -199,12 +199,29 @@ def held_out_misfit(fit: Fit | None) -> float:
     return beyond_noise(bounded_error(fit), fit.windows) if fit else 0.0
 
 
+def surplus(one: Fit, other: Fit) -> float:
+    """What another fit misses more of the held-out windows, in standard deviations by chance.
+
+    Windows are a sample of what may be recorded: sum d / sqrt(n var d), with d their differences.
+    One alone says nothing of chance: 0.
+    """
+    more = np.sum(_bounded_squares(other) - _bounded_squares(one), axis=0)
+    if len(more) < 2:
+        return 0.0
+    return float(np.sum(more) / max(np.sqrt(len(more)) * np.std(more), 1e-300))
+
+
 def bounded_error(fit: Fit) -> float:
-    """Squared error of a fit, no window counted more than an outlying one.
+    """Squared error of a fit, no window counted more than an outlying one."""
+    return float(np.sum(_bounded_squares(fit)))
+
+
+def _bounded_squares(fit: Fit) -> np.ndarray:
+    """Squared error of each output and window up to that of an outlying one, (n_y, n_windows).
 
     One is worth its recorded samples over the correlation time of their errors.
     """
     windows = fit.windows
     squares = (fit.residual**2).sum(axis=2)
     recorded = (windows.weight > 0).sum(axis=2)
-    return float(np.sum(np.minimum(squares, OUTLYING**2 * recorded / windows.correlation)))
+    return np.minimum(squares, OUTLYING**2 * recorded / windows.correlation)

@@ -15,9 +15,10 @@ from workbench.diagnosis.judge import (
     predicts,
     reasons_against,
 )
-from workbench.diagnosis.near_priors import left_near_priors
-from workbench.diagnosis.refit import Refit
+from workbench.diagnosis.near_priors import left_of_both, near_priors
+from workbench.diagnosis.refit import Refit, surplus
 from workbench.diagnosis.scan import Profile
+from workbench.diagnosis.size import DISTINCT
 from workbench.fitting.problem import Problem
 
 LARGEST_TIE = 3
@@ -26,14 +27,14 @@ CLOSE_DROP = 0.25  # of the leader's drop: within it the order is not to be trus
 CLOSE_DROP_SAME = 0.50  # the same for signatures that are one
 FAR_WORSE = 3.0  # times the misfit that is left of a recording: beyond, that one tells them apart
 
-Left = Callable[[Problem, Refit], float]  # squared error that a rival leaves
+Nearer = Callable[[Problem, Refit], Refit]  # a rival where nuisances hardly move
 
 
 def tie_group(
     problem: Problem,
     refits: list[Refit],
     profiles: dict[str, Profile],
-    left: Left = left_near_priors,
+    nearer: Nearer = near_priors,
 ) -> list[Refit]:
     """The leader and those that cannot be told from it, the leader first.
 
@@ -43,10 +44,12 @@ def tie_group(
     fifth where the other leaves only noise, or fails to predict by more than a few held-out
     windows.  Among the tied those that pass every criterion come first, effects before parameters
     that would lie far off what is known of them, and among these the one leads with the
-    least ``left`` of both recordings together, where nuisances may hardly bend for any: either
+    least left of both recordings together, where nuisances may hardly bend for any: either
     recording alone orders rivals by what its few events happen to show, and where nuisances are
-    free, what is left tells how far they bent.  Those that look most like the leader stand next to
-    it: were it wrong, it would stand for one of them.
+    free, what is left tells how far they bent.  But where one leaves at least a fifth less of the
+    held-out misfit, and not in a few windows alone, free and near the priors, that recording
+    decides.  Those that look most like the leader stand next to it: were it wrong, it would stand
+    for one of them.
 
     Source: diagnosis.md 1.6.
     """
@@ -56,7 +59,7 @@ def tie_group(
     sound = [each for each in tied if not against[id(each)]] or tied[:LARGEST_TIE]
     tied = tied[: max(len(sound), LARGEST_TIE)]
     effects = [each for each in sound if each.candidate.name in profiles] or sound
-    leader = _leader(problem, effects, left)
+    leader = _leader(problem, effects, nearer)
     others = [each for each in tied if each is not leader]
     others.sort(key=lambda r: (r not in sound, -abs(_alignment_of(leader, r, profiles))))
     return [leader, *others]
@@ -91,10 +94,26 @@ def _far_worse(other: Refit, best: Refit) -> bool:
     return 1.0 - other.drop_train > most and theirs >= ours
 
 
-def _leader(problem: Problem, effects: Sequence[Refit], left: Left) -> Refit:
+def _leader(problem: Problem, effects: Sequence[Refit], nearer: Nearer) -> Refit:
     """Which of the tied leads; see :func:`tie_group`."""
     may_lead = [each for each in effects if predicts(each)] or effects
-    return min(may_lead, key=lambda each: left(problem, each)) if may_lead[1:] else may_lead[0]
+    if len(may_lead) == 1:
+        return may_lead[0]
+    near = [nearer(problem, each) for each in may_lead]
+    rows = range(len(may_lead))
+    leads = min(rows, key=lambda k: left_of_both(near[k]))
+    closest = min(rows, key=lambda k: left_held_out(may_lead[k]))
+    pairs = ((each[closest], each[leads]) for each in (may_lead, near))
+    apart = all(_told_apart_held_out(one, other) for one, other in pairs)
+    return may_lead[closest if apart else leads]
+
+
+def _told_apart_held_out(one: Refit, other: Refit) -> bool:
+    """True where one leaves clearly less held out, by more than chance among windows explains."""
+    if one.validation is None or other.validation is None:
+        return False
+    clearly = clearly_less(left_held_out(one), left_held_out(other))
+    return clearly and surplus(one.validation, other.validation) > DISTINCT
 
 
 def _refused_by_few(other: Refit, best: Refit) -> bool:
