@@ -34,10 +34,8 @@ def held_out_n(found):
 
 @pytest.mark.filterwarnings("ignore::workbench.reading.RecordingWarning")
 @pytest.mark.parametrize(
-    "seal",
-    ["KDN", pytest.param("O-ring257", marks=pytest.mark.slow),
-     pytest.param("X-ring257", marks=pytest.mark.slow)],
-)  # fmt: skip
+    "seal", ["KDN", "X-ring257", pytest.param("O-ring257", marks=pytest.mark.slow)]
+)
 def test_the_bench_starts_with_coulomb_friction_and_ends_at_the_best_held_out_error(seal):
     found = improved(seal)
 
@@ -57,7 +55,6 @@ def test_the_vertical_cylinder_starts_with_coulomb_friction_and_predicts_unseen_
     assert unseen_m < 1.1 * 7.6e-3
 
 
-@pytest.mark.slow
 def test_kicks_that_agree_earn_friction_that_depends_on_position():
     found, unseen_m = improved_cylinder(vertical_cylinder.ALIKE)
 
