@@ -114,9 +114,7 @@ def _followed(
     careful = replace(known, considered=beside_measured(course.plant))
     if (careful.corrected != known.corrected).any():
         other = filter_pass(careful, recording, course.states)
-        known, filtered = max(
-            (known, filtered), (careful, other), key=lambda each: _likely(each[1])
-        )
+        filtered = max(filtered, other, key=_likely)
     return filtered, [ASTRAY] if _astray(recording, filtered, free) else []
 
 
