@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t as student
 
 from workbench.errors import InputError, Message
 from workbench.fitting.starts import guessed_states
@@ -118,10 +117,12 @@ def _at_the_opening(lead_pa: np.ndarray, sample_time_s: float) -> float:
     A closed valve leaks: within a tenth of a second a small tank is several noise deviations off
     the mean of the lead, and what a curve begins with too low its path has to make up for.
     """
+    from scipy.special import stdtrit  # Student's quantile; loaded where it is asked
+
     near = lead_pa[-max(round(LEAD_S / sample_time_s), LEAST_LEAD) :]
     before = np.arange(len(near)) - len(near)
     (slope, end_pa), covariance = np.polyfit(before, near, 1, cov=True)
-    clear = student.isf(DRIFTS / 2.0, len(near) - 2)
+    clear = stdtrit(len(near) - 2, 1.0 - DRIFTS / 2.0)
     drifts = abs(slope) > clear * np.sqrt(covariance[0, 0])
     return float(end_pa if drifts else near.mean())
 
