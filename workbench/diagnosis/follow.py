@@ -1,7 +1,7 @@
 """What a diagnosis follows: the scan, first fits of the few in front, refits of the best few.
 
 Those that come near the best are shaken, and rivals of a leader begin once more where it ended.
-Where the prior fit has left the priors far behind, what leads there is refitted from there too.
+Where the prior fit has left the priors behind, what leads there is refitted from there too.
 
 Source: diagnosis.md 1.4 and 1.5.
 """
@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 from workbench.diagnosis.judge import (
     LEAST_PROXY,
+    LEAST_SHARE,
     LEAST_TRAINING,
     SHARE_REASON,
     predicts,
@@ -29,7 +30,7 @@ from workbench.diagnosis.refit import (
     refit_shift,
 )
 from workbench.diagnosis.result import Where
-from workbench.diagnosis.rough import Rough, rough_fit
+from workbench.diagnosis.rough import KEPT, Rough, rough_fit
 from workbench.diagnosis.scan import Profile, scan_catalogue, scan_from_priors
 from workbench.diagnosis.shifts import Shift, shifts
 from workbench.diagnosis.ties import CLOSE_DROP_SAME, SAME_DIRECTION, alignment
@@ -85,7 +86,7 @@ def follow(
         if promising or hopeful or not refits:
             progress(f"refit with {each.profile.candidate.name}")
             refits.append(refit(problem, each))
-    refits = _lowest(refits, _from_priors(problem, imitated, progress))
+    refits = _lowest(refits, _from_priors(problem, imitated, begun, refits, progress))
     moved = shifts(problem)
     least = WORTH_A_SHIFT * max((each.drop_train for each in refits), default=0.0)
     for shift in [each for each in moved if each.leaves and each.drop > least][:SHIFTS_REFITTED]:
@@ -134,17 +135,27 @@ def _lowest(refits: Sequence[Refit], others: Iterable[Refit]) -> list[Refit]:
 
 
 def _from_priors(
-    problem: Problem, imitated: Sequence[Profile], progress: Progress
+    problem: Problem,
+    imitated: Sequence[Profile],
+    begun: Sequence[Rough],
+    refits: Sequence[Refit],
+    progress: Progress,
 ) -> Iterator[Refit]:
     """Refits of what leads where no parameter has moved, from there; none near the priors.
 
     Parameters that have gone as far as is believed may stand in for a delay together, and hold each
-    other there: no first fit from the base gives one of them back.
+    other there: no first fit from the base gives one of them back.  Nearer, most first fits do; so
+    there one that loses what leading promises is refitted, while all others leave much.
     """
-    if not gone_far(problem.base, IMPLAUSIBLE):
-        return
+    far = gone_far(problem.base, IMPLAUSIBLE)
+    lost = gone_far(problem.base) and _best_share(refits) < LEAVES_MUCH
+    kept = {each.profile.candidate.name: each.share for each in begun}
     for profile in imitated[:IMITATED]:
-        if profile.drop > max(AS_MUCH * imitated[0].drop, problem.misfit):
+        if profile.drop <= AS_MUCH * imitated[0].drop:
+            continue
+        promised = profile.drop / problem.misfit
+        loses = kept.get(profile.candidate.name, 0.0) < KEPT * min(promised, 1.0)
+        if (far and promised > 1.0) or (lost and loses and promised > LEAST_SHARE):
             progress(f"refit with {profile.candidate.name} from the priors")
             yield refit_from_priors(problem, profile)
 
