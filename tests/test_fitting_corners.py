@@ -4,13 +4,15 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from test_diagnosis import bench, coulomb
 
 from workbench.diagnosis.ranking import _reason_not_asked
-from workbench.diagnosis.refit import bounded_error, surplus
+from workbench.diagnosis.refit import bounded_error, refit_from_priors, surplus
 from workbench.diagnosis.rough import with_shape
-from workbench.diagnosis.scan import sizes_to_try
+from workbench.diagnosis.scan import scan_from_priors, sizes_to_try
 from workbench.fitting.errors import plain_chance, plain_ratio
 from workbench.fitting.linearised import parameter_steps
+from workbench.fitting.problem import pose
 from workbench.fitting.unknowns import Unknowns, nominal_unknowns
 from workbench.fitting.window_length import window_length_s
 from workbench.law_scales import scales
@@ -150,3 +152,44 @@ def test_terms_of_a_law_have_sizes_where_sensors_take_turns_or_are_silent(order)
     assert found["law[dp]@slide.pressure_pa"] == pytest.approx(2e5)
     assert found["law[sign v dp]@slide.stroke_m"] == pytest.approx(0.1)
     plant.with_values(found)
+
+
+@pytest.mark.parametrize(
+    ("plant", "longest_m"), [("servo_drive", 0.03), ("crr_arm", 0.015), ("gearbox", 0.008)]
+)
+def test_no_cushion_is_tried_that_would_be_viscous_friction(plant, longest_m):
+    """Of 24 mm in a gearbox 15 at either end are the whole stroke."""
+    plant = load_rig(f'plant = "{plant}"\n').plant
+    cushion = plant.candidates["end_cushion"]
+    stroke_m = plant.values["end_cushion.stroke_m"]
+
+    lengths_m = {each["end_cushion.length_m"] for each in sizes_to_try(plant, cushion)}
+
+    assert max(lengths_m) == longest_m < 0.5 * stroke_m
+
+
+@pytest.mark.parametrize("fixed", ["", '[fixed]\nnames = ["end_cushion.length"]\n'])
+def test_a_cushion_whose_length_is_not_scanned_keeps_the_one_of_its_rig(fixed):
+    """On the stroke of a valve none that is tried fits; where the rig fixes one no other is."""
+    stroke = '"end_cushion.stroke" = "12 mm"\n' * (not fixed)
+    values = f'[values]\n{stroke}"end_cushion.length" = "6 mm"\n'
+    rig = load_rig(f'plant = "servo_drive"\n{values}{fixed}')
+    cushion = rig.plant.candidates["end_cushion"]
+
+    trials = sizes_to_try(rig.plant, cushion, rig.fixed)
+
+    assert trials and all([*trial] == [cushion.strength] for trial in trials)
+
+
+def test_a_refit_from_the_priors_needs_no_shape_that_was_not_scanned():
+    values = '[values]\n"chamber.area" = "518.7 mm^2"\n'
+    rig = load_rig(f'plant = "cylinder_bench"\n{values}[fixed]\nnames = ["friction.wavelength"]\n')
+    problem = pose(rig, [bench(1, coulomb)])
+    wavy = (p for p in scan_from_priors(problem) if p.candidate.name == "friction_position")
+    (profile,) = wavy
+
+    found = refit_from_priors(problem, profile)
+
+    assert found.fit.windows.plant.values["friction.wavelength_m"] == pytest.approx(
+        rig.plant.values["friction.wavelength_m"]
+    )

@@ -241,6 +241,10 @@ class Effect:
         """The same effect without what is absent in it, where that spares it a state."""
         return self
 
+    def shapes_of(self, cause: Cause) -> Mapping[str, tuple[float, ...]]:
+        """Values of form fields to scan, by field: those of the cause that are something here."""
+        return cause.shapes
+
     def states(self) -> Iterable[State]:
         """States this effect adds, for example a bristle deflection or a valve lag."""
         return ()

@@ -104,7 +104,8 @@ def _begun_at(problem: Problem, candidate: Candidate, values: Mapping[str, float
     windows = windows_for(problem, candidate)
     unknowns = problem.unknowns(windows.plant, candidate)
     shapes = [f"{c.member}.{key}" for c in candidate.singles for key in c.cause.shapes]
-    unknowns = with_shape(problem, unknowns, {name: values[name] for name in shapes})
+    told = {name: values[name] for name in shapes if name in values}
+    unknowns = with_shape(problem, unknowns, told)
     t = unknowns.clipped(unknowns.scaled({**windows.plant.values, **values}))
     return windows, unknowns, t
 

@@ -173,12 +173,14 @@ def sizes_to_try(
 ) -> list[dict[str, float]]:
     """Parameter values of every size and shape of a candidate, within its bounds.
 
-    Shapes that are ``fixed`` stay as the plant has them.
+    Shapes that are ``fixed`` stay as the plant has them, and those that its member has no room for.
     """
     known = plant.parameters[candidate.strength]
     null = known.null or 0.0
     signs = (1.0, -1.0) if known.signed else (1.0,)
-    grids = {f"{candidate.member}.{key}": grid for key, grid in candidate.cause.shapes.items()}
+    (member,) = (each for each in plant.members if each.name == candidate.member)
+    known_shapes = member.shapes_of(candidate.cause)
+    grids = {f"{candidate.member}.{key}": grid for key, grid in known_shapes.items()}
     grids = {name: grid for name, grid in grids.items() if name not in fixed}
     shapes = [dict(zip(grids, values, strict=True)) for values in product(*grids.values())]
     return [

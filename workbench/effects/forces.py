@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import casadi as ca
@@ -17,6 +17,8 @@ from workbench.effect import (
     form,
     strength,
 )
+
+MOST = 0.4  # of the stroke, that one cushion covers
 
 
 def push_n(
@@ -143,6 +145,11 @@ class EndCushion(Effect):
     length_m: Expression = form(0.015, lower=0.005, upper=0.04)
     stroke_m: Expression = form(0.1, lower=1e-6)
     lower_m: Expression = form(0.0, lower=-10.0, upper=10.0)
+
+    def shapes_of(self, cause: Cause) -> Mapping[str, tuple[float, ...]]:
+        """Lengths that leave a middle without: two that meet are viscous friction."""
+        fitting = tuple(x for x in cause.shapes["length_m"] if x <= MOST * self.stroke_m)
+        return {"length_m": fitting} if fitting else {}
 
     def terms(self, now: Conditions) -> Iterator[Force]:
         body = now[self.body]
