@@ -9,8 +9,8 @@ from studies.plain import plain
 from studies.shift_cases import case_deviations, mean_deviations
 from studies.text_of_law import law_document
 from studies.text_of_next_recording import conduct_document
-from workbench.comparison.noise import NoiseSource
 from workbench.diagnosis.result import told
+from workbench.fitting.noise_source import NoiseSource
 from workbench.units import public_name, si_unit
 
 if TYPE_CHECKING:

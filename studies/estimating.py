@@ -30,9 +30,9 @@ from studies.estimator_runs import (
     rmse,
     whiteness,
 )
-from workbench.comparison.noise import recorded_noise
 from workbench.effect import Kind
 from workbench.errors import InputError, Message, listed, nearest
+from workbench.fitting.noise_source import recorded_noise
 from workbench.fitting.starts import guessed_states
 from workbench.plant import Plant
 from workbench.recording import Recording

@@ -69,7 +69,7 @@ def where_text(found: Diagnosis) -> str:
     follows = [f"{public_name(d.variable)} {percent(d.explains)}" for d in where.against[:3]]
     if not where.certain:
         lines.append(f"which is hardly more than chance: below {LEAST_GAIN:g} none is to be blamed")
-    elif alike := _alike(where):
+    elif alike := where.alike:
         others = " or ".join(alike)
         lines.append(f"which of them lacks something is not told: {where.balance}, or {others}")
     if where.certain and follows:
@@ -90,17 +90,10 @@ def _elsewhere(found: Diagnosis, where: Where) -> list[str]:
     named = found.named
     if named is None or not where.certain:
         return []
-    balances = (where.balance, *_alike(where))
+    balances = (where.balance, *where.alike)
     if any(acts_in(each, balance) for each in named.candidate.singles for balance in balances):
         return []
     return [f"{named.candidate.name} acts elsewhere: the ranking decides, by refits of windows"]
-
-
-def _alike(where: Where) -> list[str]:
-    """Other balances that gain as much as the named one, but for what chance gives."""
-    least = max(where.by_balance[where.balance] - LEAST_GAIN, 0.0)
-    gaining = (name for name, gain in where.by_balance.items() if gain > least)
-    return [name for name in gaining if name != where.balance]
 
 
 def strained_text(found: Diagnosis) -> list[str]:

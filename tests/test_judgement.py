@@ -163,9 +163,9 @@ def test_improve_writes_a_note_for_every_effect_it_added():
 def test_add_refuses_what_the_rig_fixes_and_what_changes_nothing():
     fixed = f'{BARE}[fixed]\nnames = ["friction.coulomb_force"]\n'
 
-    with pytest.raises(ValueError, match=r"bench fixes friction\.coulomb_force_n"):
+    with pytest.raises(ValueError, match=r"bench fixes friction\.coulomb_force:"):
         add(load_rig(fixed), "coulomb_friction", [TRAIN], [HELD_OUT])
-    with pytest.raises(ValueError, match=r"nothing without friction\.coulomb_force_n"):
+    with pytest.raises(ValueError, match=r"nothing without friction\.coulomb_force"):
         add(load_rig(BARE), "stiction", [TRAIN], [HELD_OUT])
 
 
@@ -206,7 +206,7 @@ def test_a_training_recording_that_is_to_be_validation_is_told():
 
 
 def test_a_fit_of_nothing_is_refused():
-    with pytest.raises(ValueError, match=r"nothing to fit: chamber\.area_m2"):
+    with pytest.raises(ValueError, match=r"nothing to fit: chamber\.area is"):
         fit(load_rig(BARE), [TRAIN], only=["chamber.area_m2"])
 
 
@@ -276,6 +276,21 @@ def test_windows_without_a_recorded_sample_say_nothing_of_the_errors():
 
     assert part.quiet == whole.quiet == 20.0
     assert part.quiet_samples == whole.quiet_samples == 200.0
+
+
+@pytest.mark.parametrize("step", [1, 10, 50, 100, 200])
+def test_white_errors_of_a_slow_sensor_are_white_however_few_a_window_has(step):
+    """The median of the ratio is 0.455 for many, 0.75 for three and 1 for two."""
+    rng = np.random.default_rng(0)
+    weight, moves = np.zeros((1, 400, 200)), np.full((1, 400), 100.0)
+    weight[:, :, ::step] = 1.0
+    white = rng.normal(size=weight.shape) * weight
+    alike = rng.normal(size=(1, 400, 1)) * weight
+
+    of_white, of_alike = (error_model(e, weight, moves, np.ones((1, 1))) for e in (white, alike))
+
+    assert of_white.moving_samples == 1.0
+    assert of_alike.moving_samples == weight.shape[2] // step
 
 
 def test_a_slide_that_rests_does_not_move_beside_a_hole():

@@ -5,11 +5,13 @@ from dataclasses import replace
 
 import pytest
 from matplotlib.colors import to_hex
-from test_report import LAG, diagnosis, ranked
+from test_report import LAG, LEAK, PLANT, diagnosis, ranked
 
 from studies.figures.diagnosis import HOLLOW, diagnosis_figures
 from studies.figures.style import BLUE, save
 from workbench.diagnosis.result import Verdict
+
+OFFSET = PLANT.candidates["sensor_offset@slide.position"]
 
 
 def test_the_key_of_a_tied_ranking_fits_its_page():
@@ -22,6 +24,17 @@ def test_the_key_of_a_tied_ranking_fits_its_page():
     assert "=: cannot be told apart here" in figure.get_suptitle()
     assert drawn.x0 >= 0.0 and drawn.y0 >= 0.0
     assert drawn.x1 <= width and drawn.y1 <= height
+
+
+def test_all_of_a_crowd_are_marked_and_no_other():
+    crowd = (LAG.name, "spool_leak", "supply_droop")
+    found = diagnosis(Verdict.RECORDING_TOO_WEAK)
+    leader, other = found.ranking
+    rows = (replace(leader, crowd=crowd), replace(other, accepted=True), ranked(OFFSET, 0.05))
+    figure = diagnosis_figures(replace(found, ranking=rows))["ranking"]
+    names = [label.get_text() for label in figure.axes[0].get_yticklabels()]
+
+    assert names == [f"= {LEAK.name}", f"= {LAG.name}", OFFSET.name]
 
 
 def test_bars_of_a_scan_are_hollow_and_those_of_a_refit_are_not():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from workbench.comparison.noise import NoiseSource, recorded_noise
+from workbench.fitting.noise_source import NoiseSource, recorded_noise
 from workbench.recording import Recording
 
 POSITION = "rod.position_m"

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from workbench.comparison.maps import error_map
-from workbench.comparison.noise import NoiseSource, recorded_noise
 from workbench.comparison.residuals import residual_of
+from workbench.fitting.noise_source import NoiseSource, recorded_noise
 from workbench.recording import Recording
 
 DT = 1e-3

@@ -5,9 +5,9 @@ import pytest
 from recording_files import read, table, text
 
 from studies.demo import DATA
-from workbench.comparison.noise import NoiseSource, recorded_noise
 from workbench.consistency import Weight, trusted
 from workbench.fitting.noise import measured_noise
+from workbench.fitting.noise_source import NoiseSource, recorded_noise
 from workbench.plants.crr_rig import crr_rig
 from workbench.reading import RecordingWarning, read_recording
 from workbench.reading.plausible import stuck_stretch

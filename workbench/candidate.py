@@ -45,6 +45,11 @@ class Candidate:
         return f"{self.member}.{self.cause.held}" if self.cause.held else None
 
     @property
+    def needed(self) -> str | None:
+        """Full name of the parameter without which this cause is nothing, if there is one."""
+        return f"{self.member}.{self.cause.needs}" if self.cause.needs else None
+
+    @property
     def singles(self) -> tuple[Candidate, ...]:
         """The causes that it puts into a plant: itself, or both of a pair."""
         return (self,)

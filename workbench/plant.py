@@ -107,9 +107,9 @@ class Plant:
 
     def ready_for(self, candidate: Candidate) -> bool:
         """False where what the cause needs is itself absent, or was dropped as such."""
-        if not candidate.cause.needs:
+        name = candidate.needed
+        if name is None:
             return True
-        name = f"{candidate.member}.{candidate.cause.needs}"
         return name in self.values and self.values[name] != self.parameters[name].null
 
     def at_null(self, *candidates: Candidate) -> Plant:

@@ -69,7 +69,7 @@ def _sizes(plant: Plant) -> Iterator[tuple[str, np.ndarray]]:
     yield "", values
     for candidate in plant.candidates.values():
         there = dict(plant.values)
-        needed = f"{candidate.member}.{candidate.cause.needs}"
+        needed = candidate.needed
         if needed in there and there[needed] == known[needed].null:
             there[needed] = known[needed].typical
         there[candidate.strength] = typical = known[candidate.strength].typical

@@ -55,7 +55,7 @@ def ranking_figure(found: Diagnosis) -> Figure:
     """
     rows = found.ranking[:SHOWN]
     leader = rows[0]
-    tied = {leader.candidate.name, *leader.tied_with} if leader.tied_with else set()
+    tied = {leader.candidate.name, *leader.alike} if leader.alike else set()
     with styled():
         figure = new_figure(COLUMN_IN, 1.2 + 0.27 * len(rows))
         axes = figure.subplots()
@@ -197,6 +197,8 @@ def _draw_term(axes: Axes, where: Where) -> None:
     axes.set_xlabel("time (s)")
     axes.set_ylabel(label)
     title = f"what the balance {public_name(where.balance)} lacks"
+    if not where.certain:
+        title = f"unknown input of {public_name(where.balance)}, hardly more than chance"
     if where.imitated > SAID:
         title += f" (below: without {100.0 * where.imitated:.0f} % that parameters may explain)"
     axes.set_title(title)
@@ -208,11 +210,13 @@ def _draw_balances(axes: Axes, where: Where) -> None:
     gains = sorted(where.by_balance.items(), key=lambda item: -item[1])[:SHOWN_BALANCES]
     places = np.arange(len(gains))
     axes.set_yticks(places, [name.replace(".", " ").replace("_", " ") for name, _ in gains])
-    colours = [RED if name == where.balance else GREY for name, _ in gains]
+    marked = (where.balance, *where.alike) if where.certain else ()
+    colours = [RED if name in marked else GREY for name, _ in gains]
     axes.barh(places, [max(gain, 0.0) for _, gain in gains], 0.6, color=colours)
     axes.set_ylim(max(len(gains), FEWEST_ROWS) - 0.5, -0.5)
     axes.set_xlabel("gained log-likelihood (-)")
-    axes.set_title("which balance")
+    told = "one of them" if len(marked) > 1 else "which balance"
+    axes.set_title(told if marked else "no balance stands out")
 
 
 def _draw_dependence(axes: Axes, where: Where, dependence: Dependence) -> None:
@@ -224,6 +228,7 @@ def _draw_dependence(axes: Axes, where: Where, dependence: Dependence) -> None:
     axes.fill_between(centres, means - spreads, means + spreads, **band)
     loop = dependence.memory
     if loop:
+        axes.plot(centres, means, color=BLUE, linewidth=0.6)
         _draw_loop(axes, loop, per, factor)
     else:
         axes.plot(centres, means, "o-", color=BLUE, markersize=2.5)

@@ -30,11 +30,11 @@ from workbench.comparison.horizons import (
     foretold,
 )
 from workbench.comparison.maps import ErrorMap, command_maps, motion_maps
-from workbench.comparison.noise import Noise, recorded_noise
 from workbench.comparison.regimes import equally_weighted, regimes_of, shares
 from workbench.comparison.residuals import Residual, residual_of
 from workbench.consistency import Finding, warned
 from workbench.fitting.errors import SignalError
+from workbench.fitting.noise_source import Noise, recorded_noise
 from workbench.fitting.window_length import window_length_s
 from workbench.law_range import warn_beyond
 from workbench.recording import Recording

@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 
 from workbench.called import result
-from workbench.comparison.noise import recorded_noise
+from workbench.fitting.noise_source import recorded_noise
 from workbench.fitting.starts import SMOOTHING_SAMPLES, bridged, guessed_states, slope
 from workbench.plant import Plant
 from workbench.recording import Recording

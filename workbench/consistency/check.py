@@ -23,6 +23,7 @@ from workbench.consistency.common_channels import in_common
 from workbench.consistency.explained import Probe, moving, probe, unexplained
 from workbench.consistency.findings import Finding, Weight
 from workbench.consistency.misreadings import Misreading, misreadings
+from workbench.consistency.noise import untold_noise
 from workbench.consistency.sensors import beyond_stops, missing, noisy, stuck, uneven_clock
 from workbench.errors import InputError
 from workbench.fitting.problem import staged
@@ -62,6 +63,7 @@ def trusted(rig: Rig, *sets: Sequence[Recording]) -> tuple[tuple[Set, ...], tupl
     once = {id(each): each for group in sets for each in group}
     found = {key: _examined(rig, each) for key, each in once.items()}
     findings = [finding for _, own in found.values() for finding in own]
+    findings += [each for one, _ in found.values() for each in untold_noise(rig, one)]
     refused = [finding.message for finding in findings if finding.weight is Weight.REFUSED]
     if refused:
         raise InputError(*refused)

@@ -126,7 +126,8 @@ def left_unexplained(fit: Fit) -> dict[str, float]:
 def _motion(windows: Windows, stateless: bool) -> np.ndarray:
     """Standard deviation of each output beyond noise, about the same means as the ratio, (n_y,)."""
     if not stateless:
-        return np.sqrt(np.mean(windows.activity**2, axis=1))
+        some = np.maximum(np.isfinite(windows.measured).any(axis=2).sum(axis=1), 1)
+        return np.sqrt(np.sum(windows.activity**2, axis=1) / some)
     seen = np.maximum(np.isfinite(windows.measured).sum(axis=(1, 2)), 1)
     variance = _spread(windows.measured, stateless) / seen
     return np.sqrt(np.maximum(variance - windows.noise**2, 0.0))

@@ -34,6 +34,7 @@ from workbench.plant import Plant
 from workbench.recording import Recording
 from workbench.rig import Rig
 from workbench.rig_laws import is_law
+from workbench.units import public_name
 
 ALIKE_SHOWN = 3  # names of what a recording does not tell from what was added
 
@@ -135,11 +136,13 @@ def _require_absent(rig: Rig, plant: Plant, candidate: Candidate) -> None:
     """Raise ValueError where a candidate is there already or has nothing to be fitted."""
     name, added = candidate.name, rig.added_to(plant)
     if candidate in added or _present(rig, plant, added, candidate):
-        raise ValueError(f"{name}: {rig.name} has it already; fit moves it")
+        shifted = candidate.held and f"it shifts {public_name(candidate.held)}, which fit moves"
+        raise ValueError(f"{name}: {shifted or f'{rig.name} has it already; fit moves it'}")
     if not plant.ready_for(candidate):
-        raise ValueError(f"{name}: nothing without {candidate.member}.{candidate.cause.needs}")
+        raise ValueError(f"{name}: nothing without {public_name(candidate.needed)}")
     if candidate.strength in rig.fixed:
-        raise ValueError(f"{name}: {rig.name} fixes {candidate.strength}: nothing to fit")
+        fixed = public_name(candidate.strength)
+        raise ValueError(f"{name}: {rig.name} fixes {fixed}: nothing to fit")
 
 
 def with_held_out(

@@ -53,11 +53,15 @@ def credible(found: Diagnosis, doubts: Sequence[Finding]) -> Diagnosis:
 
 
 def _missed(found: Diagnosis) -> dict[str, float]:
-    """Outputs that move and are not explained by what the verdict rests on, or by the base."""
-    named = found.named
+    """Outputs that move and are not explained by what the verdict rests on, or by the base.
+
+    A crowd that does the same explains what its leader does, though nobody can tell which it is.
+    """
+    first = found.ranking[0] if found.ranking else None
+    leader = found.named or (first if first and first.accepted else None)
     fits = (
         (found.law.validation, found.law.fit) if found.law
-        else (named.validation, named.fit) if named
+        else (leader.validation, leader.fit) if leader
         else (found.base_validation, found.base)
     )  # fmt: skip
     fit = next((fit for fit in fits if fit is not None), None)

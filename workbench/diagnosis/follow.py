@@ -37,6 +37,7 @@ from workbench.diagnosis.ties import CLOSE_DROP_SAME, SAME_DIRECTION, alignment
 from workbench.diagnosis.where import acts_in
 from workbench.fitting.problem import Problem
 from workbench.fitting.pulled_in import gone_far
+from workbench.units import public_name
 
 FITTED_FIRST = 8  # candidates that are followed beyond the scan at the most
 WORTH_A_LOOK = 0.05  # of the best drop of the scan
@@ -90,7 +91,7 @@ def follow(
     moved = shifts(problem)
     least = WORTH_A_SHIFT * max((each.drop_train for each in refits), default=0.0)
     for shift in [each for each in moved if each.leaves and each.drop > least][:SHIFTS_REFITTED]:
-        progress(f"refit with {shift.name} free")
+        progress(f"refit with {public_name(shift.name)} free")
         refits.append(refit_shift(problem, shift, _best_share(refits)))
     refits = _lowest_of_each(problem, refits, earlier)
     progress("the best once more from beside where they ended")

@@ -96,7 +96,7 @@ def _reason_not_asked(problem: Problem, candidate: Candidate) -> str:
     if candidate.name not in problem.whole.candidates:
         return "not applicable: measured"
     if not problem.rig.plant.ready_for(candidate):
-        return f"nothing without {candidate.member}.{candidate.cause.needs}"
+        return f"nothing without {public_name(candidate.needed)}"
     if (candidate.held or candidate.strength) in problem.rig.fixed:
         return "not applicable: fixed by the rig"
     if candidate.held and candidate.held not in problem.base.unknowns.names:
@@ -138,7 +138,7 @@ def refitted_row(
 
 def _shifted(shift: Shift) -> Ranked:
     """A shift that was not refitted counts by what freeing it would bring."""
-    stays = (f"{shift.name} stays within {LEAVES_PRIOR:g} deviations of its prior",)
+    stays = (f"{public_name(shift.name)} stays within {LEAVES_PRIOR:g} deviations of its prior",)
     return Ranked(
         candidate=shift.candidate,
         kind=Kind.PARAMETER,

@@ -139,7 +139,8 @@ class Where:
         Log-likelihood gained by an unknown input in each balance, at prior parameters; 0 where
         none is likelier.
     balance
-        The one that gains most.
+        The one that gains most; of the gas of a chamber and its heat the gas, unless the heat gains
+        clearly more.
     term
         Its missing term over the training recordings, shape (n,), in SI, named by ``term_name``
         with its unit, for example ``force_n``.
@@ -175,6 +176,13 @@ class Where:
     def certain(self) -> bool:
         """True where the balance gains more than chance gives."""
         return self.by_balance.get(self.balance, 0.0) > LEAST_GAIN
+
+    @property
+    def alike(self) -> tuple[str, ...]:
+        """Other balances that gain as much as the named one, but for what chance gives."""
+        least = max(self.by_balance.get(self.balance, 0.0) - LEAST_GAIN, 0.0)
+        gaining = (name for name, gain in self.by_balance.items() if gain > least)
+        return tuple(name for name in gaining if name != self.balance)
 
     @property
     def memory(self) -> tuple[Dependence, Loop] | None:

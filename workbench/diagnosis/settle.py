@@ -25,7 +25,7 @@ from workbench.diagnosis.size import Size, sizes
 from workbench.fitting.errors import plain_chance, plain_ratio
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.own_errors import weighed_anew
-from workbench.fitting.problem import Problem
+from workbench.fitting.problem import Problem, held_out_fit
 from workbench.fitting.resized import resized
 
 ROUNDS = 4
@@ -67,7 +67,8 @@ def settled_leader(fit: Fit, candidate: Candidate) -> Fit:
 
 def settled_refit(problem: Problem, found: Refit) -> Refit:
     """A refit with the fit of :func:`settled_leader`, or as it was; see :func:`_with_fit`."""
-    return _with_fit(problem, found, settled_leader(found.fit, found.candidate))
+    now = _with_fit(problem, found, settled_leader(found.fit, found.candidate))
+    return now if now is found else _on_its_own_yardstick(now)
 
 
 def _settled_row(problem: Problem, row: Ranked, leads: bool) -> Ranked:
@@ -76,9 +77,9 @@ def _settled_row(problem: Problem, row: Ranked, leads: bool) -> Ranked:
     What was accepted for its size is not to be told with a fit of another.
     """
     now = _with_fit(problem, row, (settled_leader if leads else settled)(row.fit, row.candidate))
-    if now is row or not row.accepted:
-        return now
-    return row if size_reasons(problem.base, now) else now
+    if now is row or (row.accepted and size_reasons(problem.base, now)):
+        return row
+    return _on_its_own_yardstick(now) if leads else now
 
 
 def _with_fit(problem: Problem, found: Found, fit: Fit) -> Found:
@@ -97,6 +98,19 @@ def _with_fit(problem: Problem, found: Found, fit: Fit) -> Found:
     )
     worse = grows_plainly(now) and now.plain_validation > found.plain_validation
     return found if worse else now
+
+
+def _on_its_own_yardstick(found: Found) -> Found:
+    """The same, held-out start states fitted with the weights of its own errors.
+
+    By those of the base, which misses far more, an output that the base could not follow counts for
+    nothing, and what is told of the held-out recording would be several times too large there.  The
+    judgement stays that of the weights which all share.
+    """
+    before = found.validation
+    if before is None:
+        return found
+    return replace(found, validation=held_out_fit(before.windows, found.fit, before))
 
 
 def _steady(before: Mapping[str, Size], now: Mapping[str, Size]) -> bool:

@@ -22,6 +22,7 @@ import numpy as np
 
 ACTIVE = 5.0  # noise deviations of an output that moves within a window
 MEDIAN = 0.4549  # of the square of a standard normal number
+FEW = 20  # errors of a window, beyond which they are as good as infinitely many
 CHANCE = 4.7  # two deviations of the median of one such number, over that median
 OUTLYING = 3.0  # windows worse than this many typical errors count no more than one that is
 
@@ -61,20 +62,36 @@ def error_model(
     return ErrorModel(
         quiet,
         _median_where(moves, beyond / np.maximum(activity, noise)),
-        _correlated(rests, ratios, error.shape[2]),
-        _correlated(moves, ratios, error.shape[2]),
+        _correlated(rests, ratios, recorded),
+        _correlated(moves, ratios, recorded),
     )
 
 
-def _correlated(chosen: np.ndarray, ratios: np.ndarray, most: int) -> np.ndarray:
+def _correlated(chosen: np.ndarray, ratios: np.ndarray, recorded: np.ndarray) -> np.ndarray:
     """Correlation times in samples, shape (n, 1): the median of the ratios tells 0.455 of them.
 
     Errors are white unless they show otherwise by more than chance, which a median of few windows
     has much of: taken as it is it would tell too much of white ones.
     """
-    found = _median_where(chosen, ratios) / MEDIAN
+    found = _median_where(chosen, ratios * (MEDIAN / _of_white(recorded))) / MEDIAN
     windows = np.maximum(chosen.sum(axis=1, keepdims=True), 1)
+    most = np.where(chosen, recorded, 1).max(axis=1, keepdims=True)
     return np.clip(np.where(found > 1.0 + CHANCE / np.sqrt(windows), found, 1.0), 1.0, most)
+
+
+def _of_white(recorded: np.ndarray) -> np.ndarray:
+    """Median of the ratio of a window with so many white errors, of the same shape.
+
+    The share of their squares along one direction of n is a Beta(1/2, (n - 1)/2) number.
+    """
+    found = np.full(recorded.shape, MEDIAN)
+    few = recorded < FEW
+    if few.any():
+        from scipy.special import betaincinv  # slow to load, and only slow sensors ask for it
+
+        n = np.maximum(recorded[few], 2)
+        found[few] = np.where(recorded[few] == 1, 1.0, n * betaincinv(0.5, (n - 1) / 2, 0.5))
+    return found
 
 
 def _median_where(chosen: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -168,8 +168,15 @@ def _plain_sums(before: Fit | None, after: Fit | None) -> np.ndarray | None:
 
 
 def _log_ratio(before: np.ndarray, after: np.ndarray) -> float:
-    """Mean logarithm of the ratios of the squared errors of all outputs, (n_y,) each."""
-    return float(np.mean(np.log(np.maximum(after / np.maximum(before, 1e-300), 1e-24))))
+    """Mean logarithm of the ratios of the squared errors of all outputs, (n_y,) each.
+
+    Without its only window an output has no errors left, and no say.
+    """
+    there = (before > 0.0) | (after > 0.0)
+    if not there.any():
+        return 0.0
+    ratios = after[there] / np.maximum(before[there], 1e-300)
+    return float(np.mean(np.log(np.maximum(ratios, 1e-24))))
 
 
 def penalised_rmse(fit: Fit) -> np.ndarray:

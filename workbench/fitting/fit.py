@@ -27,6 +27,7 @@ from workbench.fitting.unknowns import nominal_unknowns
 from workbench.plant import require
 from workbench.recording import Recording
 from workbench.rig import Rig
+from workbench.units import public_name
 
 AT_BOUND = 1e-9
 
@@ -93,7 +94,7 @@ def fit(
         asked = rig
     free = nominal_unknowns(plant, asked.deviations, asked.held, asked.added_to(plant)).names
     if not free:
-        names = ", ".join(only) or "the plant"
+        names = ", ".join(map(public_name, only)) or "the plant"
         counted = set(only) & (rig.held - rig.fixed)
         why = "is what gauge pressures count from" if counted else "is fixed or has no uncertainty"
         raise ValueError(f"nothing to fit: {names} {why} in {rig.name}")

@@ -67,9 +67,9 @@ def both_deviations(
     with g_w the gradient of each of the n windows, Lambda the weights of the prior and k_l from 1
     down to 0 over a few windows either way within a recording: what a plant has otherwise is alike
     in windows that follow one another.  The largest is told, of the curvature's, of this and of it
-    without neighbours, and no more than the prior: of few windows a product with the next may come
-    out below nothing by chance.  What all windows have wrong alike none tells.  One that the fit
-    holds at a bound has none, NaN.
+    without neighbours, and no more than the prior: of few windows products with the next may take
+    some of it away again by chance.  What all windows have wrong alike none tells.  One that the
+    fit holds at a bound has none, NaN.
 
     The curvature's deviation of a strength is that with the forms held that it is ``shaped_by``:
     where the strength is none no form can be known, so one that is hardly known says nothing of

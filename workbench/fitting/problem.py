@@ -218,10 +218,13 @@ def fitted_twice(windows: Windows, unknowns: Unknowns, t: np.ndarray) -> Fit:
     return weighed_anew(rough)
 
 
-def held_out_fit(windows: Windows, base: Fit) -> Fit:
-    """The base on held-out windows, on the yardstick of the training."""
+def held_out_fit(windows: Windows, base: Fit, near: Fit | None = None) -> Fit:
+    """A fit on held-out windows, on the yardstick of its training.
+
+    ``near`` is the same plant there on another yardstick, whose start states may suit too.
+    """
     windows = windows.scaled_like(base.windows)
-    rough = continued(refit_starts(windows, base.plant.values), ITERATIONS)
+    rough = continued(refit_starts(windows, base.plant.values, near), ITERATIONS)
     begun = refit_starts(windows.capped(rough.residual), base.plant.values, rough)
     return continued(begun, ITERATIONS)
 

@@ -87,16 +87,17 @@ def nominal_unknowns(
 ) -> Unknowns:
     """Every uncertain parameter of what is present, and the strengths and forms of what is added.
 
-    ``deviations`` are standard deviations that override the catalogue's; ``fixed`` are never
-    moved.  A strength at its null is absent, and is not moved unless its cause is in ``added`` or
-    a little of it is tolerated (``Cause.tolerated``).  What has a prior goes no further from it
-    than ``believed`` of its deviations, or of the catalogue's where these are wider: a fit of a
-    plant that lacks something is surer of its parameters than it should be.
+    ``deviations`` are standard deviations that override the catalogue's, and hold what was added
+    too, once it is there: the fit that found it tells them, and another recording goes on from it.
+    ``fixed`` are never moved.  A strength at its null is absent, and is not moved unless its cause
+    is in ``added`` or a little of it is tolerated (``Cause.tolerated``).  What has a prior goes no
+    further from it than ``believed`` of its deviations, or of the catalogue's where these are
+    wider: a fit of a plant that lacks something is surer of its parameters than it should be.
     """
     values, known = plant.values, plant.parameters
     deviations, fixed = dict(deviations or {}), set(fixed)
     measured = {signal.name for signal in plant.measured_inputs}
-    free = [name for c in added for name in (c.strength, *c.forms) if name not in fixed]
+    free = [name for name in _without_prior(plant, added, deviations) if name not in fixed]
     fixed |= {
         name
         for c in plant.candidates.values()
@@ -125,6 +126,19 @@ def nominal_unknowns(
     usual = np.array([known[name].standard_deviation(value) for name, value, *_ in rows])
     reach = believed * np.maximum(usual / scale, 1.0)
     return Unknowns(names, prior, scale, lower, upper, precision, reach=reach)
+
+
+def _without_prior(
+    plant: Plant, added: Iterable[Candidate], deviations: Mapping[str, float]
+) -> list[str]:
+    """Strengths and forms of what was added: of what is there already those that nothing tells."""
+    values, known = plant.values, plant.parameters
+    return [
+        name
+        for c in added
+        for name in (c.strength, *c.forms)
+        if name not in deviations or values[c.strength] == known[c.strength].null
+    ]
 
 
 def _size(plant: Plant, name: str) -> float:
