@@ -32,7 +32,7 @@ LEFT_OUT = (
     "the rig file once more"
 )
 OTHERWISE = "the verdict also weighs by what the model cannot follow, no window counting too much"
-LOWERED = "a row is as low as the next diagnosis fits the same model, where both of its errors fall"
+LOWERED = "a row is as low as the next diagnosis fits the same model, where both errors fall"
 FREE_RUNS = (
     "free runs over whole recordings (no judge where positions integrate: the right effect can "
     "make them worse until the next one is there):"

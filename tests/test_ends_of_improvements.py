@@ -131,7 +131,7 @@ def test_the_last_bar_and_the_errors_in_the_end_are_of_the_same_fit(rig, sets, m
     assert found.budget[-1].train == per_sample(last.base) < 0.5 * per_sample(worse.fit)
     assert found.fit is last.base and found.validation_fit is last.base_validation
     assert found.after == errors_of(last.base, last.base_validation)
-    assert "each row as low as the next diagnosis fits" in improvement_text(found, UNITS)
+    assert "a row is as low as the next diagnosis fits" in improvement_text(found, UNITS)
 
 
 def test_a_fit_of_the_model_before_a_step_is_not_taken_for_that_of_the_end(rig, sets):

@@ -31,7 +31,8 @@ def credible(found: Diagnosis, doubts: Sequence[Finding]) -> Diagnosis:
         listed = ", ".join(f"{public_name(name)} {share:.2g}" for name, share in missed.items())
         warning = Warned(
             f"nothing explains the recording (error over motion: {listed}): is it of another "
-            "plant, are its commands those that were played, is the rig file right?"
+            "plant, are its commands those that were played, is the rig file right, did something "
+            "else move it between runs that stand in one file?"
         )
         sentence = "the recording and the rig contradict each other; nothing is named"
         verdict = Verdict.RECORDING_TOO_WEAK
