@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from linearize.regions import Validity
     from studies.closed_loop_check import Check
     from workbench.comparison.compare import Comparison, RecordingComparison
-    from workbench.diagnosis.result import Diagnosis, NextRecording, Ranked, Where
+    from workbench.diagnosis.located import Where
+    from workbench.diagnosis.result import Diagnosis, NextRecording, Ranked
     from workbench.fitting.errors import SignalError
     from workbench.fitting.posterior import Moved
     from workbench.plant import Candidate

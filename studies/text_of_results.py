@@ -10,7 +10,7 @@ from studies.text import columns, number, percent, removed, shown, spread
 from studies.text_of_law import HOW, law_text
 from studies.text_of_next_recording import next_recording_text
 from studies.text_of_ranking import imitated_text, ranking_text
-from workbench.diagnosis.result import LEAST_GAIN
+from workbench.diagnosis.located import LEAST_GAIN
 from workbench.diagnosis.where import acts_in
 from workbench.fitting.posterior import FAR_MOVED
 from workbench.units import public_name
@@ -19,8 +19,9 @@ if TYPE_CHECKING:
     import numpy as np
 
     from workbench.diagnosis.addition import Addition
+    from workbench.diagnosis.located import Where
     from workbench.diagnosis.missing_term import Dependence, Loop
-    from workbench.diagnosis.result import Diagnosis, Where
+    from workbench.diagnosis.result import Diagnosis
     from workbench.fitting.errors import SignalError
     from workbench.fitting.fit import FitReport
     from workbench.fitting.gauss_newton import Fit

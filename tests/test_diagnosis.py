@@ -79,7 +79,7 @@ def test_stiction_is_not_asked_for_without_coulomb_friction(found):
     row = next(row for row in found.ranking if row.candidate.name == "stiction")
 
     assert row.decided_by is DecidedBy.NOT_APPLICABLE
-    assert row.reasons == ("nothing without friction.coulomb_force_n",)
+    assert row.reasons == ("nothing without friction.coulomb_force",)
 
 
 def test_what_was_not_followed_says_so(found):

@@ -278,21 +278,6 @@ def test_windows_without_a_recorded_sample_say_nothing_of_the_errors():
     assert part.quiet_samples == whole.quiet_samples == 200.0
 
 
-@pytest.mark.parametrize("step", [1, 10, 50, 100, 200])
-def test_white_errors_of_a_slow_sensor_are_white_however_few_a_window_has(step):
-    """The median of the ratio is 0.455 for many, 0.75 for three and 1 for two."""
-    rng = np.random.default_rng(0)
-    weight, moves = np.zeros((1, 400, 200)), np.full((1, 400), 100.0)
-    weight[:, :, ::step] = 1.0
-    white = rng.normal(size=weight.shape) * weight
-    alike = rng.normal(size=(1, 400, 1)) * weight
-
-    of_white, of_alike = (error_model(e, weight, moves, np.ones((1, 1))) for e in (white, alike))
-
-    assert of_white.moving_samples == 1.0
-    assert of_alike.moving_samples == weight.shape[2] // step
-
-
 def test_a_slide_that_rests_does_not_move_beside_a_hole():
     position_m = np.full(2000, 0.1)
     position_m[900:905] = np.nan

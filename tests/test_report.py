@@ -17,6 +17,7 @@ from studies.figures.style import new_figure, save, styled
 from studies.text import columns, shown
 from studies.text_of_results import correlation_lines, diagnosis_text, unit_names
 from workbench.diagnosis.improvement import Stage
+from workbench.diagnosis.located import Where
 from workbench.diagnosis.result import (
     DecidedBy,
     Dependence,
@@ -26,7 +27,6 @@ from workbench.diagnosis.result import (
     Ranked,
     Size,
     Verdict,
-    Where,
 )
 from workbench.diagnosis.verdict import sentence
 from workbench.effect import Kind

@@ -11,7 +11,7 @@ from studies.demo import DATA
 from workbench.consistency import examined
 from workbench.consistency.explained import moving, probe
 from workbench.diagnosis.rivals import Rehearsed, distances
-from workbench.fitting.error_model import OUTLYING
+from workbench.fitting.error_model import OUTLYING, error_model
 from workbench.fitting.gauss_newton import fit_windows
 from workbench.fitting.holes import bridging_errors, long_holes, usual_gap
 from workbench.fitting.linearised import Point
@@ -194,3 +194,18 @@ def test_rivals_are_as_far_apart_as_the_samples_of_slow_sensors_show(plant, reco
 
     assert found == sampled
     assert 100.0 < found <= OUTLYING**2 * independent
+
+
+@pytest.mark.parametrize("step", [1, 10, 50, 100, 200])
+def test_white_errors_of_a_slow_sensor_are_white_however_few_a_window_has(step):
+    """The median of the ratio is 0.455 for many, 0.75 for three and 1 for two."""
+    rng = np.random.default_rng(0)
+    weight, moves = np.zeros((1, 400, 200)), np.full((1, 400), 100.0)
+    weight[:, :, ::step] = 1.0
+    white = rng.normal(size=weight.shape) * weight
+    alike = rng.normal(size=(1, 400, 1)) * weight
+
+    of_white, of_alike = (error_model(e, weight, moves, np.ones((1, 1))) for e in (white, alike))
+
+    assert of_white.moving_samples == 1.0
+    assert of_alike.moving_samples == weight.shape[2] // step

@@ -27,8 +27,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.patches import Rectangle
 
+    from workbench.diagnosis.located import Where
     from workbench.diagnosis.missing_term import Dependence, Loop
-    from workbench.diagnosis.result import Diagnosis, Ranked, Where
+    from workbench.diagnosis.result import Diagnosis, Ranked
 
 SHOWN, SHOWN_BALANCES, SHOWN_DRIVERS = 10, 8, 3
 FEWEST_ROWS = 3  # that a panel has room for: one balance alone would be a wall

@@ -12,8 +12,8 @@ import numpy as np
 
 from workbench.diagnosis.dependence import dependences, imitated, parameter_columns
 from workbench.diagnosis.drivers import drivers
+from workbench.diagnosis.located import Where
 from workbench.diagnosis.missing_term import Course
-from workbench.diagnosis.result import Where
 from workbench.diagnosis.suspects import Suspect, suspects, wandering, with_missing_flows
 from workbench.filter_likelihoods import log_likelihoods
 from workbench.filter_passes import recording_filter, smooth

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
     from bokeh.models import Model
 
+    from workbench.diagnosis.located import Where
     from workbench.diagnosis.missing_term import Dependence
-    from workbench.diagnosis.result import Where
 
 ANR_KG_M3 = 1.185  # air at 20 degC, 1 bar and 65 % humidity: ISO 8778, as flows are read in l/min
 HEIGHT, SHOWN, MOST_POINTS = 190, 3, 2000

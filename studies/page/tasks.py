@@ -24,7 +24,8 @@ from studies.text_of_results import (
 )
 from workbench.comparison.compare import Comparison
 from workbench.comparison.independence import Independence, independence_of
-from workbench.diagnosis.result import NextRecording, Ranked, Verdict, Where
+from workbench.diagnosis.located import Where
+from workbench.diagnosis.result import NextRecording, Ranked, Verdict
 from workbench.fitting.errors import Errors
 from workbench.fitting.posterior import Moved
 from workbench.reading import enough_samples

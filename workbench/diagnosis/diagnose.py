@@ -26,6 +26,7 @@ from workbench.diagnosis.judge import (
     share_removed,
 )
 from workbench.diagnosis.law import better_base, empirical_law, standing
+from workbench.diagnosis.located import Where
 from workbench.diagnosis.next_recording import recommended
 from workbench.diagnosis.pairs import with_pairs
 from workbench.diagnosis.ranking import ranked
@@ -36,7 +37,6 @@ from workbench.diagnosis.result import (
     Law,
     Ranked,
     Verdict,
-    Where,
 )
 from workbench.diagnosis.scan import Profile
 from workbench.diagnosis.settle import with_settled_sizes

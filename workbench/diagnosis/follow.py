@@ -20,6 +20,7 @@ from workbench.diagnosis.judge import (
     reasons_against,
     share_removed,
 )
+from workbench.diagnosis.located import Where
 from workbench.diagnosis.refit import (
     Refit,
     counted_from,
@@ -29,7 +30,6 @@ from workbench.diagnosis.refit import (
     refit_shaken,
     refit_shift,
 )
-from workbench.diagnosis.result import Where
 from workbench.diagnosis.rough import KEPT, Rough, rough_fit
 from workbench.diagnosis.scan import Profile, scan_catalogue, scan_from_priors
 from workbench.diagnosis.shifts import Shift, shifts

@@ -19,6 +19,7 @@ from workbench.candidate import Candidate
 from workbench.diagnosis.judge import leaves_clearly_less, reasons_against, share_removed
 from workbench.diagnosis.law_choice import worth_scanning
 from workbench.diagnosis.law_seed import refitted, seeds
+from workbench.diagnosis.located import Where
 from workbench.diagnosis.refit import (
     Refit,
     counted_from,
@@ -26,7 +27,7 @@ from workbench.diagnosis.refit import (
     refit,
     refit_shaken,
 )
-from workbench.diagnosis.result import Law, LawTerm, Where
+from workbench.diagnosis.result import Law, LawTerm
 from workbench.diagnosis.rough import rough_fit
 from workbench.diagnosis.scan import Profile, scan
 from workbench.diagnosis.size import Size, distinct, sizes

@@ -18,8 +18,8 @@ import numpy as np
 
 from workbench.candidate import Candidate
 from workbench.diagnosis.dependence import balance_columns
+from workbench.diagnosis.located import Where
 from workbench.diagnosis.refit import Refit, refit_from, refit_shaken
-from workbench.diagnosis.result import Where
 from workbench.diagnosis.suspects import with_missing_flows
 from workbench.fitting.problem import Problem
 from workbench.plant import Plant

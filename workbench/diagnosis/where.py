@@ -29,8 +29,8 @@ from workbench.diagnosis.dependence import (
     side,
 )
 from workbench.diagnosis.drivers import drivers
+from workbench.diagnosis.located import Where
 from workbench.diagnosis.missing_term import Course, Intensities
-from workbench.diagnosis.result import Where
 from workbench.diagnosis.suspects import Suspect, suspects, wandering, with_missing_flows
 from workbench.effect import Balance
 from workbench.filter_likelihoods import log_likelihoods

@@ -19,8 +19,8 @@ from workbench.comparison.regimes import regime_shares
 from workbench.diagnosis.dependence import dependences, side
 from workbench.diagnosis.drivers import drivers
 from workbench.diagnosis.judge import effective_samples
+from workbench.diagnosis.located import Where
 from workbench.diagnosis.missing_term import Course
-from workbench.diagnosis.result import Where
 from workbench.effect import Balance
 from workbench.fitting.errors import in_units, per_sample
 from workbench.fitting.gauss_newton import Fit
