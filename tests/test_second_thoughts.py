@@ -10,7 +10,7 @@ from workbench.diagnosis import passes as passing
 from workbench.diagnosis import settle
 from workbench.diagnosis.diagnose import diagnose, silent
 from workbench.diagnosis.improve import improve
-from workbench.diagnosis.passes import Passes
+from workbench.diagnosis.passes import Kept, Passes
 from workbench.diagnosis.rounds import Rounds
 from workbench.diagnosis.settle import settled_leader
 from workbench.rig import load_rig
@@ -52,6 +52,7 @@ def test_what_is_needed_is_asked_after_what_needs_it(rig, monkeypatch):
     kept = steps_of(rig, SETS, "coulomb_friction", "stiction", "constant_force")
     done = Rounds(rig, kept=kept, steps=kept.steps).told(diagnose(rig, *SETS))
     monkeypatch.setattr(passing, "reasons_against", lambda *asked: ("brings nothing",))
+    monkeypatch.setattr(passing, "leaves_more", lambda *asked: False)
     found = improvement._thought_over(done, *SETS, silent)
 
     asked = {each.candidate.name: each for each in found.removals}
@@ -89,3 +90,27 @@ def test_a_rival_that_takes_a_place_has_its_size_settled_like_any_addition(rig, 
     assert better.fit is better.steps[-1].fit is not refitted
     assert better.validation is better.steps[-1].validation_fit
     assert better.fit.windows.scale.max() < 0.5 * refitted.windows.scale.max()
+
+
+def test_an_effect_stays_where_both_errors_grow_without_it(rig, monkeypatch):
+    """Put back from afar it may end in a worse valley than the one in which it came in.
+
+    So a leak was dropped beside a droop, and chi2 per sample went from 95 to 720.
+    """
+    monkeypatch.setattr(passing, "reasons_against", lambda base, found: ("in another valley",))
+    kept = steps_of(rig, SETS, "coulomb_friction", "constant_force")
+
+    removal, same = Passes(rig, *SETS, {}, silent).removal(kept, kept.steps[0])
+
+    assert not removal.dropped and same is kept
+    assert removal.reasons[0].startswith("without it chi2 per sample grows from ")
+
+
+@pytest.mark.parametrize(
+    ("without", "stays"),
+    [((1.3, 1.1), True), ((1.1, 1.3), True), ((1.2, 1.2), False), ((3.0, 0.99), False)],
+)
+def test_both_errors_are_to_grow_and_one_by_a_quarter(without, stays, monkeypatch):
+    monkeypatch.setattr(passing, "per_sample", lambda fit: fit)
+
+    assert passing.leaves_more(Kept((), 1.0, 1.0), Kept((), *without)) == stays

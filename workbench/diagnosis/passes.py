@@ -19,13 +19,14 @@ from workbench.candidate import Candidate
 from workbench.diagnosis.addition import Addition, assembled, refitted_addition
 from workbench.diagnosis.diagnose import Progress
 from workbench.diagnosis.evidence import weighed
-from workbench.diagnosis.judge import leaves_clearly_less, reasons_against
+from workbench.diagnosis.judge import CLEARLY_LESS, leaves_clearly_less, reasons_against
 from workbench.diagnosis.refit import Refit, refit, refit_from, refit_shaken, refit_shift
 from workbench.diagnosis.result import Diagnosis, Evidence, Ranked
 from workbench.diagnosis.rough import rough_fit
 from workbench.diagnosis.scan import scan
 from workbench.diagnosis.shifts import shifts
 from workbench.effect import Kind
+from workbench.fitting.errors import per_sample
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.problem import BELIEVED, Problem, improved_base, pose
 from workbench.recording import Recording
@@ -152,11 +153,12 @@ class Passes:
             return Removal(candidate, step.drop_train, step.drop_validation, (), False), kept
         at = self._open(kept, step)
         base, found = at.problem.base, at.found
+        bare = Kept(rest, base, at.problem.base_validation)
         against = reasons_against(base, found)
-        removal = Removal(
-            candidate, found.drop_train, found.drop_validation, against, bool(against)
-        )
-        return removal, Kept(rest, base, at.problem.base_validation) if against else kept
+        dropped = bool(against) and not leaves_more(kept, bare)
+        told = against if dropped or not against else (growth_text(kept, bare),)
+        removal = Removal(candidate, found.drop_train, found.drop_validation, told, dropped)
+        return removal, bare if dropped else kept
 
     def swaps(self, kept: Kept, step: Addition) -> tuple[list[Swap], Kept]:
         """Try the rivals of one effect in its place; the first that is clearly better takes it.
@@ -228,6 +230,31 @@ class Passes:
         evidence = weighed(Evidence.VALIDATION, problem.base_validation)
         added = refitted_addition(assembled(self.rig, rest), problem, found, evidence)
         return Kept((*rest, added), added.fit, added.validation_fit)
+
+
+def leaves_more(kept: Kept, bare: Kept) -> bool:
+    """Whether both errors grow without an effect, one of them by a quarter.
+
+    Put back it may end in another valley than the one in which it came in, and fail its criteria
+    there; what is kept all the same leaves less than anything that was found without it.
+    """
+    shares = [had / left for had, left in _errors_of(kept, bare)]
+    return max(shares) < 1.0 and min(shares) < 1.0 - CLEARLY_LESS
+
+
+def growth_text(kept: Kept, bare: Kept) -> str:
+    """How both errors grow without an effect, in words."""
+    (was, now), (was_held, now_held) = _errors_of(kept, bare)
+    return (
+        f"without it chi2 per sample grows from {was:.4g} to {now:.4g} in training, from "
+        f"{was_held:.4g} to {now_held:.4g} held out"
+    )
+
+
+def _errors_of(kept: Kept, bare: Kept) -> list[tuple[float, float]]:
+    """Errors per sample with and without an effect, in training and held out."""
+    pairs = ((kept.fit, bare.fit), (kept.validation, bare.validation))
+    return [(per_sample(had), per_sample(left)) for had, left in pairs]
 
 
 def clearly_better(base: Fit, one: Refit, other: Refit) -> bool:
