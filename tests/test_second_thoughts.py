@@ -1,5 +1,7 @@
 """Backward and swap pass where effects hang on each other: one needs another, or came on top."""
 
+from types import SimpleNamespace
+
 import pytest
 from test_diagnosis import bench, coulomb, nothing
 from test_improvement import BARE, steps_of
@@ -106,11 +108,30 @@ def test_an_effect_stays_where_both_errors_grow_without_it(rig, monkeypatch):
     assert removal.reasons[0].startswith("without it chi2 per sample grows from ")
 
 
+def missing(error, length=200):
+    """A fit that misses so much per sample of windows of this length."""
+    return SimpleNamespace(error=error, windows=SimpleNamespace(length=length))
+
+
 @pytest.mark.parametrize(
     ("without", "stays"),
     [((1.3, 1.1), True), ((1.1, 1.3), True), ((1.2, 1.2), False), ((3.0, 0.99), False)],
 )
 def test_both_errors_are_to_grow_and_one_by_a_quarter(without, stays, monkeypatch):
-    monkeypatch.setattr(passing, "per_sample", lambda fit: fit)
+    monkeypatch.setattr(passing, "per_sample", lambda fit: fit.error)
+    kept = Kept((), missing(1.0), missing(1.0))
 
-    assert passing.leaves_more(Kept((), 1.0, 1.0), Kept((), *without)) == stays
+    assert passing.leaves_more(kept, Kept((), *map(missing, without))) == stays
+    assert not passing.leaves_more(kept, Kept((), missing(9.0, 400), missing(9.0, 400)))
+
+
+def test_no_rival_takes_a_place_with_which_both_errors_grow(rig, monkeypatch):
+    """However much more of the model without both it removes."""
+    kept = steps_of(rig, SETS, "viscous_friction", "constant_force")
+    passes = Passes(rig, *SETS, {"viscous_friction": diagnose(rig, *SETS)}, silent)
+    monkeypatch.setattr(passing, "leaves_more", lambda before, after: True)
+
+    tried, same = passes.swaps(kept, kept.steps[0])
+
+    assert tried and not any(each.replaced for each in tried)
+    assert same is kept

@@ -163,7 +163,8 @@ class Passes:
     def swaps(self, kept: Kept, step: Addition) -> tuple[list[Swap], Kept]:
         """Try the rivals of one effect in its place; the first that is clearly better takes it.
 
-        None is tried in the place of what another kept effect needs.
+        Both errors must not grow with it.  None is tried in the place of what another kept effect
+        needs.
         """
         tried: list[Swap] = []
         if self._needing(kept.without(step)):
@@ -180,13 +181,14 @@ class Passes:
             if found is None:
                 continue
             better = clearly_better(at.problem.base, found, at.found)
+            now = self._with(kept.without(step), at.problem, found) if better else kept
+            better = better and not leaves_more(kept, now)
             own = (at.found.drop_train, at.found.drop_validation)
             rival = (found.drop_train, found.drop_validation)
             tried.append(Swap(step.candidate, row.candidate, *own, *rival, better))
             if better:
-                kept = self._with(kept.without(step), at.problem, found)
-                tried[-1] = replace(tried[-1], addition=kept.steps[-1])
-                return tried, kept
+                tried[-1] = replace(tried[-1], addition=now.steps[-1])
+                return tried, now
         return tried, kept
 
     def _needing(self, rest: Sequence[Addition]) -> str:
@@ -236,8 +238,11 @@ def leaves_more(kept: Kept, bare: Kept) -> bool:
     """Whether both errors grow without an effect, one of them by a quarter.
 
     Put back it may end in another valley than the one in which it came in, and fail its criteria
-    there; what is kept all the same leaves less than anything that was found without it.
+    there; what is kept all the same leaves less than anything that was found without it.  Errors
+    over longer windows are no measure of those over shorter ones.
     """
+    if kept.fit.windows.length != bare.fit.windows.length:
+        return False
     shares = [had / left for had, left in _errors_of(kept, bare)]
     return max(shares) < 1.0 and min(shares) < 1.0 - CLEARLY_LESS
 
