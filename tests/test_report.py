@@ -18,9 +18,9 @@ from studies.text import columns, shown
 from studies.text_of_results import correlation_lines, diagnosis_text, unit_names
 from workbench.diagnosis.improvement import Stage
 from workbench.diagnosis.located import Where
+from workbench.diagnosis.missing_term import Dependence
 from workbench.diagnosis.result import (
     DecidedBy,
-    Dependence,
     Diagnosis,
     Law,
     NextRecording,
