@@ -197,15 +197,18 @@ class Passes:
         return next((s.candidate.name for s in rest if not bare.ready_for(s.candidate)), "")
 
     def _open(self, kept: Kept, step: Addition) -> _Opened:
-        """The final model without one effect; two passes may ask for it."""
+        """The final model without one effect, from its values too; two passes may ask for it."""
         key = (step.candidate.name, *kept.names)
         if key not in self.opened:
             self.progress(f"without {step.candidate.name}")
             bare = assembled(self.rig, kept.without(step))
             problem = pose(bare, self.train, self.validation, believed=BELIEVED)
-            found = _put_back(problem, step.candidate, kept.fit)
+            same = kept.fit.windows.firsts == problem.base.windows.firsts
+            near = kept.fit if same else None
+            problem = (near and improved_base(problem, [near])) or problem
+            found = _put_back(problem, step.candidate, kept.fit, near)
             if better := improved_base(problem, [found.fit]):
-                problem, found = better, _put_back(better, step.candidate, kept.fit)
+                problem, found = better, _put_back(better, step.candidate, kept.fit, near)
             self.opened[key] = _Opened(problem, found)
         return self.opened[key]
 
@@ -238,8 +241,7 @@ def leaves_more(kept: Kept, bare: Kept) -> bool:
     """Whether both errors grow without an effect, one of them by a quarter.
 
     Put back it may end in another valley than the one in which it came in, and fail its criteria
-    there; what is kept all the same leaves less than anything that was found without it.  Errors
-    over longer windows are no measure of those over shorter ones.
+    there.  Errors over longer windows are no measure of those over shorter ones.
     """
     if kept.fit.windows.length != bare.fit.windows.length:
         return False
@@ -250,10 +252,8 @@ def leaves_more(kept: Kept, bare: Kept) -> bool:
 def growth_text(kept: Kept, bare: Kept) -> str:
     """How both errors grow without an effect, in words."""
     (was, now), (was_held, now_held) = _errors_of(kept, bare)
-    return (
-        f"without it chi2 per sample grows from {was:.4g} to {now:.4g} in training, from "
-        f"{was_held:.4g} to {now_held:.4g} held out"
-    )
+    grows = f"without it chi2 per sample grows from {was:.4g} to {now:.4g} in training, from "
+    return f"{grows}{was_held:.4g} to {now_held:.4g} held out"
 
 
 def _errors_of(kept: Kept, bare: Kept) -> list[tuple[float, float]]:
@@ -269,9 +269,12 @@ def clearly_better(base: Fit, one: Refit, other: Refit) -> bool:
     return ahead and not reasons_against(base, one)
 
 
-def _put_back(problem: Problem, candidate: Candidate, final: Fit) -> Refit:
-    """An effect again in the model without it, from where the final fit has it."""
-    alone = _shifted(problem, candidate) or refit_from(problem, candidate, final.plant.values)
+def _put_back(problem: Problem, candidate: Candidate, final: Fit, near: Fit | None) -> Refit:
+    """An effect again in the model without it, from where the final fit has it.
+
+    ``near`` is a fit on the same windows whose start states are taken where they suit better.
+    """
+    alone = _shifted(problem, candidate) or refit_from(problem, candidate, final.plant.values, near)
     return refit_shaken(problem, alone)
 
 
