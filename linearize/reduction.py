@@ -228,7 +228,7 @@ def _stand_in(plant: Plant, state: str) -> Expression:
     """
     member, _, quantity = state.rpartition(".")
     now = plant.model.conditions
-    owner = next(m for m in plant.members if m.name == member)
+    owner = plant.member(member)
     if quantity == "mass_kg":
         gas, room_k = now[member], now[_source(plant)].temperature_k
         return gas.pressure_pa * gas.volume_m3 / (gas.gas_constant_j_kg_k * room_k)

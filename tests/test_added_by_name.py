@@ -37,7 +37,7 @@ def test_what_is_there_is_added_without_a_word_against_it(there):
         ('[effects]\nadd = ["coulomb_friction"]\n', "coulomb_friction", "bench has it already"),
         ('[values]\n"friction.viscous" = "40 N s/m"\n', "viscous_friction", "has it already"),
         ('[fixed]\nnames = ["friction.coulomb_force"]\n', "coulomb_friction", "bench fixes"),
-        ("", "stiction", r"nothing without friction\.coulomb_force"),
+        ("", "stiction", r"nothing without friction\.coulomb_force$"),
     ],
 )
 def test_what_needs_no_fit_is_refused_before_any(more, effect, told):

@@ -143,6 +143,10 @@ class Plant:
         """Parts, then effects."""
         return (*self.parts, *self.effects)
 
+    def member(self, name: str) -> Effect:
+        """The part or effect of this name, which is one of them."""
+        return next(each for each in self.members if each.name == name)
+
     @cached_property
     def candidates(self) -> dict[str, Candidate]:
         """Every cause of the catalogue that this plant has a place for, by public name."""

@@ -41,8 +41,7 @@ def require_place(rig: Rig, plant: Plant, names: Iterable[str]) -> None:
     """
     for name in names:
         if name in rig.plant.candidates and name not in plant.candidates:
-            member = rig.plant.candidates[name].member
-            effect = next(each for each in rig.plant.members if each.name == member)
+            effect = rig.plant.member(rig.plant.candidates[name].member)
             made = public_name(getattr(effect, "produces", ""))
             what = f"is not applicable: {made or 'what it would produce'} is measured"
             expected = "recordings without that channel; take it out of [recording.channels]"

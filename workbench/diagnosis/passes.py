@@ -155,8 +155,9 @@ class Passes:
         base, found = at.problem.base, at.found
         bare = Kept(rest, base, at.problem.base_validation)
         against = reasons_against(base, found)
-        dropped = bool(against) and not leaves_more(kept, bare)
-        told = against if dropped or not against else (growth_text(kept, bare),)
+        needed = bool(against) and leaves_more(kept, bare)
+        told = (_growth_text(kept, bare),) if needed else against
+        dropped = bool(against) and not needed
         removal = Removal(candidate, found.drop_train, found.drop_validation, told, dropped)
         return removal, bare if dropped else kept
 
@@ -180,9 +181,9 @@ class Passes:
             found = _refitted(at.problem, row.candidate)
             if found is None:
                 continue
-            better = clearly_better(at.problem.base, found, at.found)
-            now = self._with(kept.without(step), at.problem, found) if better else kept
-            better = better and not leaves_more(kept, now)
+            clearly = clearly_better(at.problem.base, found, at.found)
+            now = self._with(kept.without(step), at.problem, found) if clearly else kept
+            better = clearly and not leaves_more(kept, now)
             own = (at.found.drop_train, at.found.drop_validation)
             rival = (found.drop_train, found.drop_validation)
             tried.append(Swap(step.candidate, row.candidate, *own, *rival, better))
@@ -237,28 +238,28 @@ class Passes:
         return Kept((*rest, added), added.fit, added.validation_fit)
 
 
-def leaves_more(kept: Kept, bare: Kept) -> bool:
-    """Whether both errors grow without an effect, one of them by a quarter.
+def leaves_more(kept: Kept, other: Kept) -> bool:
+    """Whether both errors grow with other effects, or without one, and one of them by a quarter.
 
-    Put back it may end in another valley than the one in which it came in, and fail its criteria
+    Put back, an effect may end in another valley than it came in by, and fail its criteria
     there.  Errors over longer windows are no measure of those over shorter ones.
     """
-    if kept.fit.windows.length != bare.fit.windows.length:
+    if kept.fit.windows.length != other.fit.windows.length:
         return False
-    shares = [had / left for had, left in _errors_of(kept, bare)]
+    shares = [had / left for had, left in _errors_of(kept, other)]
     return max(shares) < 1.0 and min(shares) < 1.0 - CLEARLY_LESS
 
 
-def growth_text(kept: Kept, bare: Kept) -> str:
+def _growth_text(kept: Kept, bare: Kept) -> str:
     """How both errors grow without an effect, in words."""
     (was, now), (was_held, now_held) = _errors_of(kept, bare)
     grows = f"without it chi2 per sample grows from {was:.4g} to {now:.4g} in training, from "
     return f"{grows}{was_held:.4g} to {now_held:.4g} held out"
 
 
-def _errors_of(kept: Kept, bare: Kept) -> list[tuple[float, float]]:
-    """Errors per sample with and without an effect, in training and held out."""
-    pairs = ((kept.fit, bare.fit), (kept.validation, bare.validation))
+def _errors_of(kept: Kept, other: Kept) -> list[tuple[float, float]]:
+    """Errors per sample of both, in training and held out."""
+    pairs = ((kept.fit, other.fit), (kept.validation, other.validation))
     return [(per_sample(had), per_sample(left)) for had, left in pairs]
 
 

@@ -178,9 +178,8 @@ def sizes_to_try(
     known = plant.parameters[candidate.strength]
     null = known.null or 0.0
     signs = (1.0, -1.0) if known.signed else (1.0,)
-    (member,) = (each for each in plant.members if each.name == candidate.member)
-    known_shapes = member.shapes_of(candidate.cause)
-    grids = {f"{candidate.member}.{key}": grid for key, grid in known_shapes.items()}
+    tried = plant.member(candidate.member).shapes_of(candidate.cause)
+    grids = {f"{candidate.member}.{key}": grid for key, grid in tried.items()}
     grids = {name: grid for name, grid in grids.items() if name not in fixed}
     shapes = [dict(zip(grids, values, strict=True)) for values in product(*grids.values())]
     return [

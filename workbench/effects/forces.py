@@ -18,7 +18,7 @@ from workbench.effect import (
     strength,
 )
 
-MOST = 0.4  # of the stroke, that one cushion covers
+LONGEST_CUSHION = 0.4  # of the stroke at either end, chosen
 
 
 def push_n(
@@ -148,7 +148,7 @@ class EndCushion(Effect):
 
     def shapes_of(self, cause: Cause) -> Mapping[str, tuple[float, ...]]:
         """Lengths that leave a middle without: two that meet are viscous friction."""
-        fitting = tuple(x for x in cause.shapes["length_m"] if x <= MOST * self.stroke_m)
+        fitting = tuple(x for x in cause.shapes["length_m"] if x <= LONGEST_CUSHION * self.stroke_m)
         return {"length_m": fitting} if fitting else {}
 
     def terms(self, now: Conditions) -> Iterator[Force]:

@@ -73,24 +73,25 @@ def _correlated(chosen: np.ndarray, ratios: np.ndarray, recorded: np.ndarray) ->
     Errors are white unless they show otherwise by more than chance, which a median of few windows
     has much of: taken as it is it would tell too much of white ones.
     """
-    found = _median_where(chosen, ratios * (MEDIAN / _of_white(recorded))) / MEDIAN
+    found = _median_where(chosen, ratios / _excess_of_few(recorded)) / MEDIAN
     windows = np.maximum(chosen.sum(axis=1, keepdims=True), 1)
     most = np.where(chosen, recorded, 1).max(axis=1, keepdims=True)
     return np.clip(np.where(found > 1.0 + CHANCE / np.sqrt(windows), found, 1.0), 1.0, most)
 
 
-def _of_white(recorded: np.ndarray) -> np.ndarray:
-    """Median of the ratio of a window with so many white errors, of the same shape.
+def _excess_of_few(recorded: np.ndarray) -> np.ndarray:
+    """Median of the ratio of so many white errors over that of very many, of the same shape.
 
     The share of their squares along one direction of n is a Beta(1/2, (n - 1)/2) number.
     """
-    found = np.full(recorded.shape, MEDIAN)
+    found = np.ones(recorded.shape)
     few = recorded < FEW
     if few.any():
         from scipy.special import betaincinv  # slow to load, and only slow sensors ask for it
 
         n = np.maximum(recorded[few], 2)
-        found[few] = np.where(recorded[few] == 1, 1.0, n * betaincinv(0.5, (n - 1) / 2, 0.5))
+        median = np.where(recorded[few] == 1, 1.0, n * betaincinv(0.5, (n - 1) / 2, 0.5))
+        found[few] = median / MEDIAN
     return found
 
 
