@@ -22,6 +22,7 @@ from studies.study import Claim, Extent, Outcome
 from workbench.diagnosis.result import Verdict
 
 STRONG = 0.60  # of the misfit, removed by an effect whose size is to be right
+ALONE = 0.90  # of the misfit, removed by an effect beside which hardly anything acts
 CLOSE = 0.10  # of a hidden size
 KNOWN_TO = 2.0  # standard deviations that a size may be off
 CHANCE = 0.05  # of a sample that speaks against a bar that is reached
@@ -87,12 +88,17 @@ def _sizes(strong: Sequence[Row]) -> Iterator[Claim]:
     """The bar for the sizes of effects that lead and remove most of the misfit."""
     if strong:
         errors = [abs(r.found / r.size - 1.0) for r in strong]
-        close = sum(error <= CLOSE for error in errors)
+        alone = [e for e, r in zip(errors, strong, strict=True) if r.own_drop > ALONE]
         told = sum(abs(r.found - r.size) <= KNOWN_TO * r.deviation for r in strong)
-        counted = f"{close} of {len(errors)} within {CLOSE:.0%}, {told} within two deviations"
-        found = f"{median(errors):.1%} ({counted})"
+        counted = f"{_close(errors)} within {CLOSE:.0%}, {told} within two deviations"
+        where = f"; where one removes over {ALONE:.0%}, {_close(alone)}" if alone else ""
+        found = f"{median(errors):.1%} ({counted}{where})"
         what = f"median error of the size of strong effects, at most {CLOSE:.0%}"
         yield Claim(what, found, median(errors) <= CLOSE)
+
+
+def _close(errors: Sequence[float]) -> str:
+    return f"{sum(error <= CLOSE for error in errors)} of {len(errors)}"
 
 
 def _of_others(rows: Sequence[Row], enough: Enough) -> Iterator[Claim]:

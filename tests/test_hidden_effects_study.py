@@ -106,6 +106,15 @@ def test_sizes_of_strong_effects_are_claimed_by_their_median():
     assert not held(outcome([close, off, off]))[key]
 
 
+def test_sizes_are_counted_apart_where_an_effect_removes_nearly_all():
+    alone, off = row(found=10.4, own_drop=0.95), row(found=6.0, own_drop=0.7)
+    claims = outcome([alone, off]).claims
+    (said,) = (each.found for each in claims if each.claim.startswith("median error of the size"))
+
+    assert "1 of 2 within 10%" in said
+    assert said.endswith("where one removes over 90%, 1 of 1)")
+
+
 def test_an_effect_that_hardly_shows_counts_among_all_only():
     weak = row("stiction", "valve_lag", place=7, own_drop=0.1, verdict="nothing_missing")
     said = held(outcome([row(), row("stiction"), row("wall_heat"), weak]))
