@@ -230,6 +230,7 @@ def _where(where: Where) -> Document:
     return {
         "balance": where.balance,
         "certain": where.certain,
+        "alike": list(where.alike),
         "by_balance": {name: plain(gain) for name, gain in where.by_balance.items()},
         "against": [
             {"variable": public_name(each.variable), "explains": plain(each.explains)}

@@ -197,6 +197,7 @@ def _stays(each: Removal) -> str:
 
 def _rivals(each: Swap) -> list[tuple[str, str, str, str]]:
     verdict = "takes its place" if each.replaced else "not clearly better"
+    verdict = "both errors would grow" if each.leaves_more else verdict
     shares = ((each.share_train, each.share_validation), (each.rival_train, each.rival_validation))
     (a, b), (c, d) = ((removed(x), removed(y)) for x, y in shares)
     return [
@@ -246,6 +247,7 @@ def improvement_document(found: Improvement, unit_of: Mapping[str, str]) -> Docu
                 "rival_share_train": plain(told(each.rival_train)),
                 "rival_share_validation": plain(told(each.rival_validation)),
                 "replaced": each.replaced,
+                "leaves_more": each.leaves_more,
             }
             for each in found.swaps
         ],

@@ -91,8 +91,7 @@ def _elsewhere(found: Diagnosis, where: Where) -> list[str]:
     named = found.named
     if named is None or not where.certain:
         return []
-    balances = (where.balance, *where.alike)
-    if any(acts_in(each, balance) for each in named.candidate.singles for balance in balances):
+    if any(acts_in(each, balance) for each in named.candidate.singles for balance in where.marked):
         return []
     return [f"{named.candidate.name} acts elsewhere: the ranking decides, by refits of windows"]
 

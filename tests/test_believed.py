@@ -203,3 +203,22 @@ def test_a_narrow_prior_of_a_fit_does_not_narrow_what_is_believed():
         row = found.names.index("atmosphere.pressure_pa")
         below, above = (float(each[row]) * found.scale[row] for each in found.ends)
         assert (below, above) == (pytest.approx(-reach), pytest.approx(reach))
+
+
+def test_what_was_added_goes_as_far_as_there_is_at_the_price_of_its_prior():
+    """It came in while something else was missing, and may have imitated that."""
+    text = (
+        'name = "bench"\nplant = "cylinder_bench"\n[effects]\nadd = ["constant_force"]\n'
+        '[values]\n"constant_force.force" = "1 N"\n'
+        '[uncertainty]\n"constant_force.force" = "0.1 N"\n'
+    )
+    rig = load_rig(text)
+    added = rig.added_to(rig.plant)
+    found = nominal_unknowns(rig.plant, rig.deviations, rig.held, added, believed=BELIEVED)
+    row = found.names.index("constant_force.force_n")
+    below, above = (float(each[row]) * found.scale[row] for each in found.ends)
+
+    assert found.scale[row] == pytest.approx(0.1) and found.with_prior[row]
+    assert below < -10.0 and above > 10.0
+    others = [k for k in range(len(found)) if k != row]
+    assert others and np.isfinite(found.ends[0][others]).all()

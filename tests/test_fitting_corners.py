@@ -1,5 +1,6 @@
 """Corners of fits and rankings: silent outputs, single windows, narrow bounds, what a rig holds."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,6 +11,7 @@ from workbench.diagnosis.ranking import _reason_not_asked
 from workbench.diagnosis.refit import bounded_error, refit_from_priors, surplus
 from workbench.diagnosis.rough import with_shape
 from workbench.diagnosis.scan import scan_from_priors, sizes_to_try
+from workbench.effects.forces import EndCushion
 from workbench.fitting.errors import plain_chance, plain_ratio
 from workbench.fitting.linearised import parameter_steps
 from workbench.fitting.problem import pose
@@ -166,6 +168,18 @@ def test_no_cushion_is_tried_that_would_be_viscous_friction(plant, longest_m):
     lengths_m = {each["end_cushion.length_m"] for each in sizes_to_try(plant, cushion)}
 
     assert max(lengths_m) == longest_m < 0.5 * stroke_m
+
+
+@pytest.mark.parametrize(
+    ("shapes", "tried"), [({}, {}), ({"lower_m": (0.0, 0.01), "length_m": (0.008, 9.0)},) * 2]
+)
+def test_a_cushion_of_ones_own_has_the_shapes_of_its_cause(shapes, tried):
+    """It may have none, or others than the length."""
+    (cause,) = EndCushion.causes
+    cushion = EndCushion(name="mine", body="slide")
+    fitting = {**tried, "length_m": (0.008,)} if tried else {}
+
+    assert cushion.shapes_of(replace(cause, shapes=shapes)) == fitting
 
 
 @pytest.mark.parametrize("fixed", ["", '[fixed]\nnames = ["end_cushion.length"]\n'])

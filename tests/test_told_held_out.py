@@ -8,10 +8,13 @@ import pytest
 from test_fitting_corners import errors
 from test_report import diagnosis
 
+from studies.documents import diagnosis_document
 from studies.figures.diagnosis import diagnosis_figures
 from studies.hidden_benches import SERVO_DRIVE
 from studies.hidden_effects import recordings
+from studies.page.missing_term import _head
 from studies.truth.cases import read_cases
+from workbench.consistency import check, trusted
 from workbench.consistency.noise import untold_noise
 from workbench.diagnosis import credible as crediting
 from workbench.diagnosis.addition import add
@@ -98,13 +101,34 @@ def slow_position(step):
 
 def test_a_sensor_whose_motion_passes_for_noise_is_told_before_a_fit():
     """Compare alone told it: 17 mm of noise, where 0.02 are, take the position out of a fit."""
-    (finding,) = untold_noise(default_rig("servo_drive"), slow_position(100))
+    (finding,) = untold_noise(default_rig("servo_drive"), [slow_position(100)])
 
     assert finding.channel == "slide.position"
     assert "differences of its samples tell" in finding.what and "noise = ..." in finding.remedy
-    assert not untold_noise(default_rig("servo_drive"), slow_position(1))
+    assert not untold_noise(default_rig("servo_drive"), [slow_position(1)])
     known = replace(slow_position(100), noise={"slide.position_m": 2e-5})
-    assert not untold_noise(default_rig("servo_drive"), known)
+    assert not untold_noise(default_rig("servo_drive"), [known])
+
+
+def test_a_still_piece_of_one_recording_tells_the_noise_of_all_that_are_fitted():
+    rig, moving = default_rig("servo_drive"), slow_position(100)
+    resting = slow_position(1)
+    resting["slide.position_m"][:] = 0.14 + 2e-5 * np.random.default_rng(5).standard_normal(8000)
+    only = ("valve.command_v", "chamber_a.pressure_pa")
+    elsewhere = replace(moving, channels={name: moving["valve.command_v"] for name in only})
+
+    assert not untold_noise(rig, [moving, resting])
+    assert [each.channel for each in untold_noise(rig, [moving, elsewhere])] == ["slide.position"]
+
+
+def test_noise_of_a_held_out_recording_is_that_of_the_training(monkeypatch):
+    asked = []
+    monkeypatch.setattr(check, "untold_noise", lambda rig, train: asked.append(train) or [])
+    train, held_out = slow_position(1), slow_position(100)
+    trusted(default_rig("servo_drive"), [train], [held_out])
+
+    assert [[each.name for each in group] for group in asked] == [[train.name]]
+    assert np.isfinite(asked[0][0]["slide.position_m"]).all()
 
 
 def test_an_output_of_one_window_makes_no_chance_of_the_others():
@@ -130,6 +154,28 @@ def test_a_term_that_is_no_more_than_chance_is_not_drawn_as_what_is_missing():
     assert any("lacks" in title for title in titles[0]) and "which balance" in titles[0]
     assert any("hardly more than chance" in title for title in titles[1])
     assert "no balance stands out" in titles[1]
+
+
+@pytest.mark.parametrize(
+    ("gains", "head", "marked"),
+    [
+        ((178.0, 3.0), "the balance chamber a energy", ["chamber_a.energy"]),
+        ((178.0, 175.0), "one of the balances chamber a energy, chamber a mass",
+         ["chamber_a.energy", "chamber_a.mass"]),
+        ((2.0, 0.0), "no balance stands out", []),
+    ],
+    ids=["one", "alike", "none"],
+)  # fmt: skip
+def test_page_and_json_are_as_sure_of_a_balance_as_the_figure(gains, head, marked):
+    names = ("chamber_a.energy", "chamber_a.mass")
+    found = diagnosis()
+    by_balance = dict(zip(names, gains, strict=True))
+    where = replace(found.where, balance=names[0], by_balance=by_balance)
+    told = diagnosis_document(replace(found, where=where), {})["where"]
+
+    assert list(where.marked) == marked
+    assert _head([each.replace("_", " ").replace(".", " ") for each in marked]).count(head) == 1
+    assert ([told["balance"], *told["alike"]] if told["certain"] else []) == marked
 
 
 def test_balances_that_gain_alike_are_both_marked():

@@ -82,3 +82,17 @@ def test_what_is_added_keeps_the_fit_that_predicts(monkeypatch):
     for plain, kept in ((1.3, "judged"), (0.8, "settled")):
         monkeypatch.setattr(settle, "plain_ratio", lambda before, after, plain=plain: plain)
         assert settle.settled_refit(PROBLEM, row).fit == kept
+
+
+@pytest.mark.parametrize(("passed", "kept"), [((), "judged"), (("fails",), "settled")])
+def test_what_is_added_keeps_the_size_that_was_accepted(passed, kept, monkeypatch):
+    """As the diagnosis tells it; what failed its criteria before has no such size to lose."""
+    row = replace(ranked(LEAK, 0.5, accepted=True), fit="judged", plain_validation=0.9)
+    monkeypatch.setattr(settle, "settled_leader", lambda fit, candidate: "settled")
+    monkeypatch.setattr(settle, "plain_ratio", lambda before, after: 0.8)
+    monkeypatch.setattr(settle, "plain_chance", lambda before, after: 0.0)
+    monkeypatch.setattr(settle, "sizes", lambda fit, names: {})
+    monkeypatch.setattr(settle, "reasons_against", lambda base, found: passed)
+    monkeypatch.setattr(settle, "size_reasons", lambda base, found: ["its size is at a bound"])
+
+    assert settle.settled_refit(PROBLEM, row).fit == kept

@@ -44,8 +44,8 @@ class Rig:
     plant
         The plant with all values set; causes that it may lack stand in it at null.
     added, removed
-        Public names of causes, with their place: added ones are free in a fit, removed ones are
-        at null.
+        Public names of causes, with their place: added ones are free in a fit, but for what
+        ``deviations`` say of them; removed ones are at null.
     deviations
         One standard deviation in SI by full parameter name, where it overrides the catalogue's.
     fixed
@@ -91,7 +91,7 @@ class Rig:
         return self.fixed | {AMBIENT} if gauges else self.fixed
 
     def with_added(self, plant: Plant, names: Iterable[str]) -> Rig:
-        """The rig with a plant in which more causes stand: free in a fit, and removed no longer."""
+        """The rig with a plant in which more causes stand: added, and removed no longer."""
         added = (*self.added, *names)
         removed = tuple(name for name in self.removed if name not in added)
         return replace(self, plant=plant, added=added, removed=removed)

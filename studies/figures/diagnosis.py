@@ -198,6 +198,8 @@ def _draw_term(axes: Axes, where: Where) -> None:
     axes.set_xlabel("time (s)")
     axes.set_ylabel(label)
     title = f"what the balance {public_name(where.balance)} lacks"
+    if where.alike:
+        title += ", if it is that one"
     if not where.certain:
         title = f"unknown input of {public_name(where.balance)}, hardly more than chance"
     if where.imitated > SAID:
@@ -211,7 +213,7 @@ def _draw_balances(axes: Axes, where: Where) -> None:
     gains = sorted(where.by_balance.items(), key=lambda item: -item[1])[:SHOWN_BALANCES]
     places = np.arange(len(gains))
     axes.set_yticks(places, [name.replace(".", " ").replace("_", " ") for name, _ in gains])
-    marked = (where.balance, *where.alike) if where.certain else ()
+    marked = where.marked
     colours = [RED if name in marked else GREY for name, _ in gains]
     axes.barh(places, [max(gain, 0.0) for _, gain in gains], 0.6, color=colours)
     axes.set_ylim(max(len(gains), FEWEST_ROWS) - 0.5, -0.5)

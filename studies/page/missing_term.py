@@ -11,10 +11,11 @@ from studies.figures.decimation import peaks
 from studies.figures.style import BLUE, RED
 from studies.page.look import MEASURED, chart, column, put, row, sharing, text
 from studies.text import RATE, labelled, percent
+from workbench.errors import listed
 from workbench.units import display_scale, display_unit, public_name, suffix
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Collection, Mapping, Sequence
 
     from bokeh.models import Model
 
@@ -31,6 +32,7 @@ class MissingTerm:
 
     def __init__(self) -> None:
         self._terms: Mapping[str, Where] = {}
+        self._marked: tuple[str, ...] = ()
 
     def build(self) -> Model:
         """Its widgets."""
@@ -49,10 +51,9 @@ class MissingTerm:
         self._choice.visible = bool(terms)
         self._balance.options = names = [*self._terms]
         first = names[0] if names else ""
-        put(
-            self._head,
-            f"<h2>Where the plant fails: the balance {escape(first)}</h2>" if first else "",
-        )
+        self._marked = next((where.marked for where in terms.values()), ())
+        head = _head([_words(name) for name in self._marked]) if first else ""
+        put(self._head, head)
         if self._balance.value == first:
             self._draw()
         else:
@@ -73,7 +74,7 @@ class MissingTerm:
         below = [_dependence(each, factor, unit) for each in strongest]
         for each in below:
             sharing(each, 1, 260)
-        gained, term = _balances(where), _over_time(where, factor, unit)
+        gained, term = _balances(where, self._marked), _over_time(where, factor, unit)
         first = row(sharing(gained, 1, 320), sharing(term, 2, 520))
         self._charts.children = [first, row(*below, top=True)]
 
@@ -89,17 +90,26 @@ def in_people(name: str) -> tuple[float, str]:
     return 1.0 / display_scale(name).factor, display_unit(name)
 
 
-def _balances(where: Where) -> Any:
+def _head(marked: Sequence[str]) -> str:
+    """Which balance fails, one of several alike, or none more than chance gives."""
+    if not marked:
+        return "<h2>Where the plant fails: no balance stands out</h2>"
+    one = "the balance" if len(marked) == 1 else "one of the balances"
+    return f"<h2>Where the plant fails: {one} {escape(listed(marked))}</h2>"
+
+
+def _balances(where: Where, marked: Collection[str]) -> Any:
     """Log-likelihood that an unknown flow gains, by balance."""
     from bokeh.models import FactorRange
 
     gains = sorted(where.by_balance.items(), key=lambda item: item[1])[-8:]
     names = [_words(name) for name, _ in gains]
+    title = "one of them lacks something" if len(marked) > 1 else "which balance lacks something"
     found = chart(
-        "gained log-likelihood (-)", "", HEIGHT, "which balance lacks something",
+        "gained log-likelihood (-)", "", HEIGHT, title if marked else "none stands out",
         y_range=FactorRange(*names), tools="",
     )  # fmt: skip
-    colours = [RED if name == where.balance else MEASURED for name, _ in gains]
+    colours = [RED if name in marked else MEASURED for name, _ in gains]
     found.hbar(names, height=0.6, right=[max(g, 0.0) for _, g in gains], color=colours)
     return found
 

@@ -53,7 +53,8 @@ Set = tuple[Recording, ...]
 def trusted(rig: Rig, *sets: Sequence[Recording]) -> tuple[tuple[Set, ...], tuple[Finding, ...]]:
     """The sets of recordings without the samples of stuck sensors, and what is doubtful in them.
 
-    All keep the outputs and optional inputs that every one of them carries.
+    All keep the outputs and optional inputs that every one of them carries.  The first set is the
+    one that a fit is made of, and takes its noise from.
 
     Raises
     ------
@@ -63,7 +64,7 @@ def trusted(rig: Rig, *sets: Sequence[Recording]) -> tuple[tuple[Set, ...], tupl
     once = {id(each): each for group in sets for each in group}
     found = {key: _examined(rig, each) for key, each in once.items()}
     findings = [finding for _, own in found.values() for finding in own]
-    findings += [each for one, _ in found.values() for each in untold_noise(rig, one)]
+    findings += untold_noise(rig, [found[id(each)][0] for group in sets[:1] for each in group])
     refused = [finding.message for finding in findings if finding.weight is Weight.REFUSED]
     if refused:
         raise InputError(*refused)

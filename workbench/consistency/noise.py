@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from workbench.consistency.findings import Finding, Weight
-from workbench.fitting.noise_source import Noise, NoiseSource, recorded_noise
+from workbench.fitting.noise import measured_noise
+from workbench.fitting.noise_source import NoiseSource, recorded_noise
 from workbench.recording import Recording
 from workbench.rig import Rig
 from workbench.units import display_unit, public_name, scale
@@ -13,32 +16,40 @@ from workbench.units import display_unit, public_name, scale
 MOST = 0.02  # of the range: a sensor that has more hardly counts beside others
 
 
-def untold_noise(rig: Rig, recording: Recording) -> list[Finding]:
+def untold_noise(rig: Rig, recordings: Sequence[Recording]) -> list[Finding]:
     """Outputs whose motion passes for noise, because they are never still between two samples.
 
-    A slow sensor that moves far from one sample to the next shows it.
+    A slow sensor that moves far from one sample to the next shows it.  A fit takes the noise from
+    all its recordings together: a still piece of one tells it for the others.
     """
+    return [
+        _finding(recording, name, noise, share)
+        for recording in recordings
+        for name in _unclear(rig, recording)
+        for noise in measured_noise([r for r in recordings if name in r.channels], [name]).values()
+        if (share := noise / float(np.ptp(_seen(recording, name)))) > MOST
+    ]
+
+
+def _unclear(rig: Rig, recording: Recording) -> list[str]:
+    """Outputs of which a recording alone tells no noise."""
     found = recorded_noise(recording, rig.fit_for(recording).measured).values()
-    told = ((each, _share(recording, each)) for each in found)
-    return [_finding(recording, each, share) for each, share in told if share > MOST]
+    return [each.name for each in found if each.source is NoiseSource.UNCLEAR]
 
 
-def _share(recording: Recording, noise: Noise) -> float:
-    """What of the range of an output its noise is, 0 where it is known."""
-    if noise.source is not NoiseSource.UNCLEAR:
-        return 0.0
-    values = recording[noise.name]
-    return noise.value / float(np.nanmax(values) - np.nanmin(values))
+def _seen(recording: Recording, name: str) -> np.ndarray:
+    values = recording[name]
+    return values[np.isfinite(values)]
 
 
-def _finding(recording: Recording, noise: Noise, share: float) -> Finding:
-    shown = scale(display_unit(noise.name), noise.name).from_si(noise.value)
+def _finding(recording: Recording, name: str, noise: float, share: float) -> Finding:
+    shown = scale(display_unit(name), name).from_si(noise)
     return Finding(
         Weight.NOTICE,
         recording.source or recording.name,
-        public_name(noise.name),
+        public_name(name),
         "its noise cannot be told, since it is never still: differences of its samples tell "
-        f"{shown:.3g} {display_unit(noise.name)}, {share:.0%} of its range, and so it hardly "
+        f"{shown:.3g} {display_unit(name)}, {share:.0%} of its range, and so it hardly "
         "counts in a fit",
         "if you know its noise, give noise = ... for the channel in [recording]",
     )

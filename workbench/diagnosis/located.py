@@ -68,6 +68,11 @@ class Where:
         return tuple(name for name in gaining if name != self.balance)
 
     @property
+    def marked(self) -> tuple[str, ...]:
+        """The named balance and those alike; none where it gains no more than chance gives."""
+        return (self.balance, *self.alike) if self.certain else ()
+
+    @property
     def memory(self) -> tuple[Dependence, Loop] | None:
         """The variable that the term follows most, and the loop it runs there; None without."""
         first = next(iter(self.against), None)

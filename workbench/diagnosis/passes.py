@@ -2,7 +2,9 @@
 
 Forward selection judges an effect against the model of its round.  What came later may have made it
 needless, or may have turned the scales for a rival.  So in the end each is taken out once, all else
-is fitted again, and it is put back: the criteria of its round must hold again (backward pass).  At
+is fitted again, and it is put back: the criteria of its round must hold again (backward pass).  Put
+back it may end in another valley than it came in by, and fail them there: where that leaves more
+than the final model, and so does the model without it, the criteria say nothing and it stays.  At
 the same place its rivals are tried, and one that is clearly better in training and held out takes
 its place (swap pass).
 
@@ -20,15 +22,13 @@ from workbench.diagnosis.addition import Addition, assembled, refitted_addition
 from workbench.diagnosis.diagnose import Progress
 from workbench.diagnosis.evidence import weighed
 from workbench.diagnosis.judge import CLEARLY_LESS, leaves_clearly_less, reasons_against
-from workbench.diagnosis.refit import Refit, refit, refit_from, refit_shaken, refit_shift
+from workbench.diagnosis.put_back import fitted_without, in_its_place
+from workbench.diagnosis.refit import Refit
 from workbench.diagnosis.result import Diagnosis, Evidence, Ranked
-from workbench.diagnosis.rough import rough_fit
-from workbench.diagnosis.scan import scan
-from workbench.diagnosis.shifts import shifts
 from workbench.effect import Kind
 from workbench.fitting.errors import per_sample
 from workbench.fitting.gauss_newton import Fit
-from workbench.fitting.problem import BELIEVED, Problem, improved_base, pose
+from workbench.fitting.problem import BELIEVED, Problem, pose
 from workbench.recording import Recording
 from workbench.rig import Rig
 
@@ -40,9 +40,11 @@ class Removal:
     """One accepted effect taken out of the final model and put back.
 
     share_train, share_validation
-        Of the misfit of the fitted model without it: what it removes.
+        Of the misfit of the fitted model without it: what it removes.  NaN where it was not put
+        back, or not where it came from.
     reasons
-        The criteria that it fails there; empty where it earns its place.
+        The criteria that it fails there, or why it stays without them; empty where it earns its
+        place.
     dropped
         True where it was left out.
     """
@@ -59,6 +61,7 @@ class Swap:
     """One accepted effect against a rival in its place, each share of the misfit without both.
 
     ``replaced`` is True where the rival took the place: then ``addition`` is that of the rival.
+    ``leaves_more`` is True where it is clearly better there, and yet leaves more than what is kept.
     """
 
     candidate: Candidate
@@ -68,6 +71,7 @@ class Swap:
     rival_train: float
     rival_validation: float
     replaced: bool
+    leaves_more: bool = False
     addition: Addition | None = field(default=None, repr=False)
 
     @property
@@ -152,13 +156,14 @@ class Passes:
         if kept.judged(step):
             return Removal(candidate, step.drop_train, step.drop_validation, (), False), kept
         at = self._open(kept, step)
-        base, found = at.problem.base, at.found
-        bare = Kept(rest, base, at.problem.base_validation)
-        against = reasons_against(base, found)
-        needed = bool(against) and leaves_more(kept, bare)
-        told = (_growth_text(kept, bare),) if needed else against
-        dropped = bool(against) and not needed
-        removal = Removal(candidate, found.drop_train, found.drop_validation, told, dropped)
+        found = at.found
+        bare = Kept(rest, at.problem.base, at.problem.base_validation)
+        against = reasons_against(bare.fit, found)
+        elsewhere = leaves_more(kept, Kept(kept.steps, found.fit, found.validation))
+        if against and elsewhere and leaves_more(kept, bare):
+            return Removal(candidate, nan, nan, (_growth_text(kept, bare),), False), kept
+        dropped = bool(against)
+        removal = Removal(candidate, found.drop_train, found.drop_validation, against, dropped)
         return removal, bare if dropped else kept
 
     def swaps(self, kept: Kept, step: Addition) -> tuple[list[Swap], Kept]:
@@ -178,15 +183,16 @@ class Passes:
                 continue
             at = self._open(kept, step)
             self.progress(f"{row.candidate.name} in place of {step.candidate.name}")
-            found = _refitted(at.problem, row.candidate)
+            found = in_its_place(at.problem, row.candidate)
             if found is None:
                 continue
             clearly = clearly_better(at.problem.base, found, at.found)
             now = self._with(kept.without(step), at.problem, found) if clearly else kept
-            better = clearly and not leaves_more(kept, now)
+            grows = clearly and leaves_more(kept, now)
+            better = clearly and not grows
             own = (at.found.drop_train, at.found.drop_validation)
             rival = (found.drop_train, found.drop_validation)
-            tried.append(Swap(step.candidate, row.candidate, *own, *rival, better))
+            tried.append(Swap(step.candidate, row.candidate, *own, *rival, better, grows))
             if better:
                 tried[-1] = replace(tried[-1], addition=now.steps[-1])
                 return tried, now
@@ -204,13 +210,7 @@ class Passes:
             self.progress(f"without {step.candidate.name}")
             bare = assembled(self.rig, kept.without(step))
             problem = pose(bare, self.train, self.validation, believed=BELIEVED)
-            same = kept.fit.windows.firsts == problem.base.windows.firsts
-            near = kept.fit if same else None
-            problem = (near and improved_base(problem, [near])) or problem
-            found = _put_back(problem, step.candidate, kept.fit, near)
-            if better := improved_base(problem, [found.fit]):
-                problem, found = better, _put_back(better, step.candidate, kept.fit, near)
-            self.opened[key] = _Opened(problem, found)
+            self.opened[key] = _Opened(*fitted_without(problem, step.candidate, kept.fit))
         return self.opened[key]
 
     def _rivals(self, kept: Kept, step: Addition) -> list[Ranked]:
@@ -239,10 +239,9 @@ class Passes:
 
 
 def leaves_more(kept: Kept, other: Kept) -> bool:
-    """Whether both errors grow with other effects, or without one, and one of them by a quarter.
+    """Whether both errors grow with other effects, or another fit, and one of them by a quarter.
 
-    Put back, an effect may end in another valley than it came in by, and fail its criteria
-    there.  Errors over longer windows are no measure of those over shorter ones.
+    Errors over longer windows are no measure of those over shorter ones.
     """
     if kept.fit.windows.length != other.fit.windows.length:
         return False
@@ -268,33 +267,3 @@ def clearly_better(base: Fit, one: Refit, other: Refit) -> bool:
     ahead = leaves_clearly_less(one.drop_train, other.drop_train)
     ahead = ahead and leaves_clearly_less(one.drop_validation, other.drop_validation)
     return ahead and not reasons_against(base, one)
-
-
-def _put_back(problem: Problem, candidate: Candidate, final: Fit, near: Fit | None) -> Refit:
-    """An effect again in the model without it, from where the final fit has it.
-
-    ``near`` is a fit on the same windows whose start states are taken where they suit better.
-    """
-    alone = _shifted(problem, candidate) or refit_from(problem, candidate, final.plant.values, near)
-    return refit_shaken(problem, alone)
-
-
-def _refitted(problem: Problem, candidate: Candidate) -> Refit | None:
-    """A rival in the place of an effect, from the scan's best sizes; None where it has none."""
-    base = problem.base
-    names = problem.whole.candidates
-    if candidate.name not in names or not problem.whole.ready_for(candidate):
-        return None
-    if candidate.held in base.unknowns.names:
-        return _shifted(problem, candidate)
-    at = base.windows, base.unknowns, base.point
-    profiles = scan(problem.whole, *at, [candidate], base.derivatives, problem.rig.fixed)
-    if not profiles:
-        return None
-    return refit_shaken(problem, refit(problem, rough_fit(problem, profiles[0])))
-
-
-def _shifted(problem: Problem, candidate: Candidate) -> Refit | None:
-    """A fitted parameter without its prior; None where the cause is no shift of one."""
-    moved = [each for each in shifts(problem) if each.candidate.name == candidate.name]
-    return refit_shift(problem, moved[0]) if moved else None

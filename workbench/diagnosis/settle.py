@@ -18,7 +18,7 @@ from dataclasses import replace
 from typing import TypeVar
 
 from workbench.candidate import Candidate
-from workbench.diagnosis.judge import grows_plainly, size_reasons
+from workbench.diagnosis.judge import grows_plainly, reasons_against, size_reasons
 from workbench.diagnosis.refit import ITERATIONS, Refit
 from workbench.diagnosis.result import Ranked
 from workbench.diagnosis.size import Size, sizes
@@ -66,9 +66,13 @@ def settled_leader(fit: Fit, candidate: Candidate) -> Fit:
 
 
 def settled_refit(problem: Problem, found: Refit) -> Refit:
-    """A refit with the fit of :func:`settled_leader`, or as it was; see :func:`_with_fit`."""
+    """A refit with the fit of :func:`settled_leader`, or as it was; see :func:`_settled_row`."""
     now = _with_fit(problem, found, settled_leader(found.fit, found.candidate))
-    return now if now is found else _on_its_own_yardstick(now)
+    if now is found or (
+        size_reasons(problem.base, now) and not reasons_against(problem.base, found)
+    ):
+        return found
+    return _on_its_own_yardstick(now)
 
 
 def _settled_row(problem: Problem, row: Ranked, leads: bool) -> Ranked:

@@ -147,9 +147,13 @@ class EndCushion(Effect):
     lower_m: Expression = form(0.0, lower=-10.0, upper=10.0)
 
     def shapes_of(self, cause: Cause) -> Mapping[str, tuple[float, ...]]:
-        """Lengths that leave a middle without: two that meet are viscous friction."""
-        fitting = tuple(x for x in cause.shapes["length_m"] if x <= LONGEST_CUSHION * self.stroke_m)
-        return {"length_m": fitting} if fitting else {}
+        """Lengths that leave a middle without: two that meet are viscous friction.
+
+        In a stroke too short for any of them the plant's own length stays.
+        """
+        most = LONGEST_CUSHION * self.stroke_m
+        fitting = {"length_m": tuple(x for x in cause.shapes.get("length_m", ()) if x <= most)}
+        return {name: grid for name, grid in {**cause.shapes, **fitting}.items() if grid}
 
     def terms(self, now: Conditions) -> Iterator[Force]:
         body = now[self.body]

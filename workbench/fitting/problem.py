@@ -19,7 +19,7 @@ from workbench.fitting.noise import measured_noise
 from workbench.fitting.own_errors import ITERATIONS, consistent, weighed_anew
 from workbench.fitting.pulled_in import towards_priors
 from workbench.fitting.shaken import shaken
-from workbench.fitting.start_states import refit_starts
+from workbench.fitting.start_states import carried, refit_starts
 from workbench.fitting.unknowns import Unknowns, nominal_unknowns
 from workbench.fitting.window_length import window_length_s
 from workbench.fitting.windows import MOST_WINDOWS, Windows, cut_windows, one_clock
@@ -45,7 +45,7 @@ class Problem:
     whole
         The plant with all absent effects in their places, for the recordings' channels.
     added
-        Causes that the rig file added: their strengths are free.
+        Causes that the rig file added: their strengths are free, but for the rig's deviations.
     base
         The prior fit on the training windows.
     base_validation
@@ -141,10 +141,8 @@ def improved_base(problem: Problem, fits: Sequence[Fit]) -> Problem | None:
     points = []
     for fit in fits:
         values = {**base.windows.plant.values, **fit.plant.values}
-        states = list(fit.windows.plant.state_list)
-        rows = [states.index(name) for name in base.windows.plant.state_list]
         t = base.unknowns.clipped(base.unknowns.scaled(values))
-        points.append(Point(t, fit.point.starts[rows]))
+        points.append(Point(t, carried(fit.point.starts, fit.windows, base.windows)))
     if not points:
         return None
     best = points_costs(base.windows, base.unknowns, points).best

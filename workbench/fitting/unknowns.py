@@ -92,9 +92,11 @@ def nominal_unknowns(
     ``fixed`` are never moved.  A strength at its null is absent, and is not moved unless its cause
     is in ``added`` or a little of it is tolerated (``Cause.tolerated``).  What has a prior goes no
     further from it than ``believed`` of its deviations, or of the catalogue's where these are
-    wider: a fit of a plant that lacks something is surer of its parameters than it should be.
+    wider: a fit of a plant that lacks something is surer of its parameters than it should be.  What
+    was added goes on as far as there is, at the price of its prior: it came in while that was
+    missing.
     """
-    values, known = plant.values, plant.parameters
+    values, known, added = plant.values, plant.parameters, tuple(added)
     deviations, fixed = dict(deviations or {}), set(fixed)
     measured = {signal.name for signal in plant.measured_inputs}
     free = [name for name in _without_prior(plant, added, deviations) if name not in fixed]
@@ -124,8 +126,15 @@ def nominal_unknowns(
     prior, scale, precision = (np.array([row[k] for row in rows]) for k in (1, 2, 3))
     lower, upper = (np.array([bounds[n][k] for n in names]) for k in (0, 1))
     usual = np.array([known[name].standard_deviation(value) for name, value, *_ in rows])
-    reach = believed * np.maximum(usual / scale, 1.0)
+    came_in = _movers(added)
+    ends = [np.inf if name in came_in else believed for name in names]
+    reach = np.array(ends) * np.maximum(usual / scale, 1.0)
     return Unknowns(names, prior, scale, lower, upper, precision, reach=reach)
+
+
+def _movers(candidates: Iterable[Candidate]) -> set[str]:
+    """Strengths and forms of causes."""
+    return {name for c in candidates for name in (c.strength, *c.forms)}
 
 
 def _without_prior(
