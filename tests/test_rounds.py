@@ -61,6 +61,40 @@ def test_an_effect_that_is_refused_alone_comes_in_with_the_next(rig, singly):
     assert found.warnings == () and "unexplained" in first.warnings[0]
 
 
+def contradicting(monkeypatch, times):
+    """The first few diagnoses name nothing, whatever leads: rig and recording contradict."""
+    left = [True] * times
+
+    def credible(found, doubts):
+        withdrawn = bool(left) and left.pop()
+        return replace(found, contradicted=True, sentence="they contradict") if withdrawn else found
+
+    monkeypatch.setattr(diagnosis, "credible", credible)
+
+
+def test_two_effects_come_in_where_one_alone_leaves_the_recording_contradicted(
+    rig, singly, monkeypatch
+):
+    """A leak was first beside a missing friction of 13 N, passed every criterion, and was told."""
+    contradicting(monkeypatch, 1)
+    found = improve(rig, [recorded(1, 0.5)], [recorded(2, 0.5)])
+    first, second, *_ = found.diagnoses
+
+    assert first.contradicted and first.ranking[0].accepted and not second.contradicted
+    assert set(found.kept) == {"coulomb_friction", "constant_force"}
+    assert found.ahead[0].sentence.endswith("comes in with constant_force")
+
+
+def test_nothing_comes_in_where_two_effects_leave_the_recording_contradicted(
+    rig, singly, monkeypatch
+):
+    contradicting(monkeypatch, 2)
+    found = improve(rig, [recorded(1, 0.5)], [recorded(2, 0.5)])
+
+    assert found.kept == () and found.rig is rig
+    assert "no effect passes every criterion on top of it" in found.ahead[0].sentence
+
+
 def test_two_that_come_in_together_are_told_and_thought_over_like_a_pair(rig, singly):
     """The first one's note is no longer that of the round which refused it."""
     found = improve(rig, [recorded(1, 0.9)], [recorded(2, 0.1)])

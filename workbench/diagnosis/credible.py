@@ -13,7 +13,8 @@ from dataclasses import replace
 from workbench.consistency.explained import left_unexplained
 from workbench.consistency.findings import Finding, Weight
 from workbench.diagnosis.result import Diagnosis, Verdict
-from workbench.diagnosis.warned import Warned
+from workbench.diagnosis.warned import Of, Warned
+from workbench.effect import Kind
 from workbench.units import public_name
 
 MOST_UNEXPLAINED = 0.9  # error over motion, of every output, by the fit that a verdict rests on
@@ -32,7 +33,8 @@ def credible(found: Diagnosis, doubts: Sequence[Finding]) -> Diagnosis:
         warning = Warned(
             f"nothing explains the recording (error over motion: {listed}): is it of another "
             "plant, are its commands those that were played, is the rig file right, did something "
-            "else move it between runs that stand in one file?"
+            f"else move it between runs that stand in one file?{_two_at_once(found)}",
+            Of.MODEL,
         )
         sentence = "the recording and the rig contradict each other; nothing is named"
         verdict = Verdict.RECORDING_TOO_WEAK
@@ -51,6 +53,15 @@ def credible(found: Diagnosis, doubts: Sequence[Finding]) -> Diagnosis:
         sentence = f"{found.sentence}, if the recording can be trusted"
         return replace(found, verdict=verdict, sentence=sentence)
     return found
+
+
+def _two_at_once(found: Diagnosis) -> str:
+    """What else may be, where an effect passes every criterion all the same."""
+    first = found.ranking[0] if found.ranking else None
+    if first is None or not first.accepted or first.kind is not Kind.EFFECT:
+        return ""
+    name = first.candidate.name
+    return f" Or are two effects missing at once? improve looks for another one beside {name}"
 
 
 def _missed(found: Diagnosis) -> dict[str, float]:

@@ -45,9 +45,10 @@ def improve(
     The effect added is the first of the ranking where it passes every criterion, also where an
     empirical law would do better: a physical effect comes first.  What the held-out recording alone
     refuses may come in with the next one (:mod:`workbench.diagnosis.rounds`).  Where recording and
-    rig contradict each other nothing more is added, and what was added before stays.  With ``law``
-    an empirical law is taken in the end, where one passes the same criteria.  An interrupt after
-    the first finished round ends the work there, with what is finished.
+    rig contradict each other only two effects at once are added that end it; else what was added
+    before stays.  With ``law`` an empirical law is taken in the end, where one passes the same
+    criteria.  An interrupt after the first finished round ends the work there, with what is
+    finished.
 
     Raises
     ------

@@ -3,9 +3,11 @@
 A round adds what its diagnosis accepts first.  Where it accepts nothing, one effect may have failed
 on the held-out recording alone because a second one is missing too: what imitates the second in
 training misleads elsewhere.  So the effect that removes most, and at least half, is tried for one
-round more.  Where that round accepts another effect on top of it, the two come in as a pair: if
-together they pass the criteria for a pair against the model without both and leave a fifth less
-held out, and each of them passes those of a single effect on top of the other.
+round more.  So is one that passes every criterion where nothing is named, because what is left with
+it contradicts the recording still: what else is missing may be as large.  Where that round accepts
+another effect on top of it, the two come in as a pair: if together they pass the criteria for a
+pair against the model without both and leave a fifth less held out, and each of them passes those
+of a single effect on top of the other.
 
 Source: diagnosis.md 1.9, 1.10 and 4.5 (accept, refit, scan again; judge the pair).
 """
@@ -183,21 +185,18 @@ def _round(done: Rounds, asked: _Asked) -> Rounds:
     current = assembled(done.rig, done.steps)
     diagnosis = asked.diagnosis(current)
     done = done.told(diagnosis).fitted_again(diagnosis)
-    if diagnosis.contradicted:
-        asked.progress(f"stopped: {diagnosis.sentence}")
-        return done
     if accepts(diagnosis):
         asked.progress(f"accepted {diagnosis.ranking[0].candidate.name}")
         step = accept(current, diagnosis)
         return done.added(step, *(diagnosis for _ in step.candidate.singles))
-    hopeful = _promising(diagnosis)
-    if hopeful is None:
-        return done
     try:
-        return _further(done, current, hopeful, asked)
+        later = _further(done, current, _promising(diagnosis), asked)
     except KeyboardInterrupt:
-        asked.progress(f"stopped beside {hopeful.candidate.name}: what is finished stays")
+        asked.progress("stopped one round further: what is finished stays")
         return replace(done, stopped=True)
+    if diagnosis.contradicted and len(later.steps) == len(done.steps):
+        asked.progress(f"stopped: {diagnosis.sentence}")
+    return later
 
 
 def leaves_less(fits: Sequence[Fit | None], errors: Sequence[float]) -> bool:
@@ -222,8 +221,13 @@ def accepts(diagnosis: Diagnosis) -> bool:
 def _promising(diagnosis: Diagnosis) -> Ranked | None:
     """The single effect that removes most of those that the held-out recording alone refuses.
 
-    What removes much in training can lack a share of both only by the held-out recording.
+    What removes much in training can lack a share of both only by the held-out recording.  Where
+    rig and recording contradict each other it is what leads, if it passes every criterion.
     """
+    if diagnosis.contradicted:
+        (leader,) = diagnosis.ranking[:1] or (None,)
+        names = leader and leader.accepted and leader.fit is not None and _is_effect(leader)
+        return leader if names and not diagnosis.too_short else None
     refused = [
         row
         for row in diagnosis.ranking
@@ -233,8 +237,10 @@ def _promising(diagnosis: Diagnosis) -> Ranked | None:
     return max(refused, key=lambda row: row.drop_train, default=None)
 
 
-def _further(done: Rounds, current: Rig, row: Ranked, asked: _Asked) -> Rounds:
-    """A refused effect with the next one that passes on top of it; as it was where they fail."""
+def _further(done: Rounds, current: Rig, row: Ranked | None, asked: _Asked) -> Rounds:
+    """An effect with the next one that passes on top of it; as it was where they fail."""
+    if row is None:
+        return done
     first, refused = done.diagnoses[-1], row.candidate
     asked.progress(f"one round further with {refused.name}")
     steps = (*done.steps, addition_of(current, first, row))
