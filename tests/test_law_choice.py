@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from workbench.diagnosis.law_choice import _plainest, _Secants, _stable_gains
+from workbench.diagnosis.law_choice import _numbers, _plainest, _Secants, _stable_gains
 from workbench.plants import PLANTS
 from workbench.rig_laws import with_laws
 
@@ -57,3 +57,13 @@ def test_a_gain_counts_within_the_bounds_of_a_coefficient():
 
     assert one.gains(np.arange(10))[0] == pytest.approx(10.0)
     assert held.gains(np.arange(10))[0] == pytest.approx(10 * (2 * 0.5 - 0.5**2))
+
+
+@pytest.mark.parametrize("far", [1e160, np.inf, np.nan])
+def test_a_term_that_loses_a_window_takes_no_others_with_it(far):
+    """Its square overflowed, and what the others gain was no number either."""
+    changes = np.random.default_rng(3).standard_normal((3, 4, 20))
+    kept = changes.copy()
+    changes[1, 2, 7], kept[1] = far, 0.0
+
+    assert (_numbers(changes) == kept).all()

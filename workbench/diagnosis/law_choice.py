@@ -39,6 +39,7 @@ HALVES = 40
 NEARLY = 1.0 - CLOSE_DROP  # of the most that a term gains on the same windows
 STABLE = 0.7  # of the halves: what one window alone asks for is in half of them
 AS_MUCH = 0.95  # of the gain of another term, by which a constant is told in its place
+RUNS_AWAY = 1e75  # deviations: beyond, squares and what is made of them are no numbers
 SEED = 1
 
 
@@ -88,7 +89,7 @@ def worth_scanning(
     starts, values = carried(point.starts, windows, richer), at.unknowns.values(point.t)
     steps = {c.strength: _secant(richer.plant.parameters[c.strength]) for c in terms}
     plants = [richer.plant.with_values({**values, name: h}) for name, h in steps.items()]
-    changes = metric.rows(richer.residuals(plants, starts)) - metric.normal.residual
+    changes = _numbers(metric.rows(richer.residuals(plants, starts)) - metric.normal.residual)
     bounds = (richer.plant.parameters[name] for name in steps)
     ends = np.array([(each.lower, each.upper) for each in bounds])
     secants = _secants(metric, changes, *np.sort(ends / np.array([*steps.values()])[:, None]).T)
@@ -108,6 +109,15 @@ def _plainest(terms: Sequence[Candidate], gains: np.ndarray) -> int:
         if alike and term.cause.drivers == (CONSTANT,) and gains[row] >= AS_MUCH * gains[best]:
             return row
     return best
+
+
+def _numbers(changes: np.ndarray) -> np.ndarray:
+    """What terms change, (n_terms, n_windows, n); nothing where a window is lost by a size.
+
+    One that runs away has no secant, and its square would be no number for all terms.
+    """
+    lost = ~(np.abs(changes) < RUNS_AWAY).all(axis=(1, 2), keepdims=True)
+    return np.where(lost, 0.0, changes)
 
 
 def _secant(known: Parameter) -> float:
