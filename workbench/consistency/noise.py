@@ -22,13 +22,19 @@ def untold_noise(rig: Rig, recordings: Sequence[Recording]) -> list[Finding]:
     A slow sensor that moves far from one sample to the next shows it.  A fit takes the noise from
     all its recordings together: a still piece of one tells it for the others.
     """
-    return [
-        _finding(recording, name, noise, share)
-        for recording in recordings
-        for name in _unclear(rig, recording)
-        for noise in measured_noise([r for r in recordings if name in r.channels], [name]).values()
-        if (share := noise / float(np.ptp(_seen(recording, name)))) > MOST
-    ]
+    found = []
+    for recording in recordings:
+        for name in _unclear(rig, recording):
+            noise = _noise_of_all(recordings, name)
+            share = noise / float(np.ptp(_seen(recording, name)))
+            if share > MOST:
+                found.append(_finding(recording, name, noise, share))
+    return found
+
+
+def _noise_of_all(recordings: Sequence[Recording], name: str) -> float:
+    """The noise of an output as a fit takes it from those that have it."""
+    return measured_noise([each for each in recordings if name in each.channels], [name])[name]
 
 
 def _unclear(rig: Rig, recording: Recording) -> list[str]:

@@ -222,18 +222,21 @@ def _promising(diagnosis: Diagnosis) -> Ranked | None:
     """The single effect that removes most of those that the held-out recording alone refuses.
 
     What removes much in training can lack a share of both only by the held-out recording.  Where
-    rig and recording contradict each other it is what leads, if it passes every criterion.
+    one that passes every criterion leads, and rig and recording contradict each other all the same,
+    it is that one; what was fitted to too little promises nothing.
     """
-    if diagnosis.contradicted:
-        (leader,) = diagnosis.ranking[:1] or (None,)
-        names = leader and leader.accepted and leader.fit is not None and _is_effect(leader)
-        return leader if names and not diagnosis.too_short else None
+    singles = [row for row in diagnosis.ranking if row.fit is not None and _is_effect(row)]
+    if diagnosis.too_short:
+        return None
+    leading = [row for row in singles if row.accepted and row is diagnosis.ranking[0]]
+    if leading:
+        return leading[0]
     refused = [
         row
-        for row in diagnosis.ranking
-        if row.fit is not None and _is_effect(row) and row.drop_train >= PROMISES
+        for row in singles
+        if row.drop_train >= PROMISES
         and {HELD_OUT_REASON} <= {*row.reasons} <= {HELD_OUT_REASON, SHARE_REASON}
-    ]  # fmt: skip
+    ]
     return max(refused, key=lambda row: row.drop_train, default=None)
 
 
