@@ -20,6 +20,7 @@ A pair pays for the parameters of both, takes twice the share, and both sizes mu
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from math import exp, isclose, isnan, log, sqrt
 
 from workbench.candidate import Candidate
@@ -62,6 +63,11 @@ def reasons_against(base: Fit, refit: Refit, parameters: int = 0) -> tuple[str, 
     if share_removed(refit) < each * LEAST_SHARE or refit.drop_train < each * LEAST_TRAINING:
         against.append(SHARE_REASON if each == 1 else f"{SHARE_REASON} each")
     return (*against, *size_reasons(base, refit))
+
+
+def held_out_refuses(reasons: Collection[str]) -> bool:
+    """True where the held-out recording alone refuses: a share of both is lacking by it only."""
+    return {HELD_OUT_REASON} <= {*reasons} <= {HELD_OUT_REASON, SHARE_REASON}
 
 
 def predicts(refit: Refit) -> bool:

@@ -2,11 +2,10 @@
 
 Forward selection judges an effect against the model of its round.  What came later may have made it
 needless, or may have turned the scales for a rival.  So in the end each is taken out once, all else
-is fitted again, and it is put back: the criteria of its round must hold again (backward pass).  Put
-back it may end in another valley than it came in by, and fail them there: where that leaves more
-than the final model, and so does the model without it, the criteria say nothing and it stays.  At
-the same place its rivals are tried, and one that is clearly better in training and held out takes
-its place (swap pass).
+is fitted again, and it is put back: the criteria of its round must hold again (backward pass).  But
+held out, errors are weighed there as by a model that misses far more: what is refused by that alone
+stays where both errors grow without it.  At the same place its rivals are tried, and one that is
+clearly better in training and held out takes its place (swap pass).
 
 Source: diagnosis.md 1.10.
 """
@@ -21,7 +20,12 @@ from workbench.candidate import Candidate
 from workbench.diagnosis.addition import Addition, assembled, refitted_addition
 from workbench.diagnosis.diagnose import Progress
 from workbench.diagnosis.evidence import weighed
-from workbench.diagnosis.judge import CLEARLY_LESS, leaves_clearly_less, reasons_against
+from workbench.diagnosis.judge import (
+    CLEARLY_LESS,
+    held_out_refuses,
+    leaves_clearly_less,
+    reasons_against,
+)
 from workbench.diagnosis.put_back import fitted_without, in_its_place
 from workbench.diagnosis.refit import Refit
 from workbench.diagnosis.result import Diagnosis, Evidence, Ranked
@@ -41,7 +45,7 @@ class Removal:
 
     share_train, share_validation
         Of the misfit of the fitted model without it: what it removes.  NaN where it was not put
-        back, or not where it came from.
+        back, or where this says the opposite of both errors.
     reasons
         The criteria that it fails there, or why it stays without them; empty where it earns its
         place.
@@ -159,8 +163,7 @@ class Passes:
         found = at.found
         bare = Kept(rest, at.problem.base, at.problem.base_validation)
         against = reasons_against(bare.fit, found)
-        elsewhere = leaves_more(kept, Kept(kept.steps, found.fit, found.validation))
-        if against and elsewhere and leaves_more(kept, bare):
+        if held_out_refuses(against) and leaves_more(kept, bare):
             return Removal(candidate, nan, nan, (_growth_text(kept, bare),), False), kept
         dropped = bool(against)
         removal = Removal(candidate, found.drop_train, found.drop_validation, against, dropped)
@@ -239,7 +242,7 @@ class Passes:
 
 
 def leaves_more(kept: Kept, other: Kept) -> bool:
-    """Whether both errors grow with other effects, or another fit, and one of them by a quarter.
+    """Whether both errors grow with other effects, or without one, and one of them by a quarter.
 
     Errors over longer windows are no measure of those over shorter ones.
     """

@@ -32,8 +32,8 @@ from workbench.diagnosis.improvement import Ahead, Change, Stage
 from workbench.diagnosis.judge import (
     CLEARLY_LESS,
     HELD_OUT_REASON,
-    SHARE_REASON,
     clearly_less,
+    held_out_refuses,
     left_held_out,
     reasons_against,
 )
@@ -232,10 +232,7 @@ def _promising(diagnosis: Diagnosis) -> Ranked | None:
     if leading:
         return leading[0]
     refused = [
-        row
-        for row in singles
-        if row.drop_train >= PROMISES
-        and {HELD_OUT_REASON} <= {*row.reasons} <= {HELD_OUT_REASON, SHARE_REASON}
+        row for row in singles if row.drop_train >= PROMISES and held_out_refuses(row.reasons)
     ]
     return max(refused, key=lambda row: row.drop_train, default=None)
 
