@@ -7,7 +7,8 @@ on where a first one ended, and tells how many answers are of other code.  Visib
 effect whose own refit removes more than 30 % of the misfit.
 
 ``python -m studies.hidden_study --kind law --plant servo_drive`` answers a part of the full grid;
-``--alone`` takes the small differences away that every truth has beside what it hides.
+``--alone`` takes the small differences away that every truth has beside what it hides, ``--without
+wall_k_per_j`` one of them: walls that warm.
 
 Source: diagnosis.md 5 (test bench).
 """
@@ -25,7 +26,15 @@ from studies.hidden_benches import BENCHES
 from studies.hidden_claims import outcome
 from studies.hidden_effects import Recorded
 from studies.hidden_rows import Kind, Row, plain, row_again
-from studies.hidden_tasks import SLOW, Task, alone, recorded, tasks
+from studies.hidden_tasks import (
+    SLOW,
+    Task,
+    alone,
+    differences_of,
+    recorded,
+    tasks,
+    without,
+)
 from studies.kept import Kept
 from studies.study import Extent, Outcome, Study
 from studies.versions import code_of_loops
@@ -98,6 +107,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--only", nargs="+", metavar="NAME", help="what is hidden")
     parser.add_argument("--seeds", type=int, nargs="+")
     parser.add_argument("--alone", action="store_true", help="no small differences beside it")
+    parser.add_argument(
+        "--without", nargs="+", metavar="FIELD", help="small differences to leave out"
+    )
     parser.add_argument("--processes", type=int, default=PROCESSES)
     parser.add_argument("-o", "--output", type=Path, default=Path("studies_out/hidden-effects"))
     asked = parser.parse_args(arguments)
@@ -110,6 +122,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
         and (asked.seeds is None or task.seed in asked.seeds)
     ]
     part = [alone(task) for task in part] if asked.alone else part
+    if asked.without:
+        known = set().union(*map(differences_of, part))
+        if unknown := sorted({*asked.without} - known):
+            parser.error(f"--without {unknown[0]}: expected some of {', '.join(sorted(known))}")
+        part = [without(task, asked.without) for task in part]
     said = outcome(
         finished(asked.output, part, lambda line: print(line, flush=True), asked.processes)
     )

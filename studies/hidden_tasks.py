@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from studies.hidden_benches import BENCHES, SERVO_DRIVE, bench_of
@@ -98,7 +98,19 @@ def _widths() -> Iterator[Task]:
 
 def alone(task: Task) -> Task:
     """The same question without the small differences that every truth has: what they do to it."""
-    return replace(task, cases=tuple(replace(case, differences=()) for case in task.cases))
+    return without(task, differences_of(task))
+
+
+def without(task: Task, fields: Collection[str]) -> Task:
+    """The same question without these differences, by the field of the truth that they act on."""
+    left = (tuple(d for d in case.differences if d.field not in fields) for case in task.cases)
+    pairs = zip(task.cases, left, strict=True)
+    return replace(task, cases=tuple(replace(case, differences=d) for case, d in pairs))
+
+
+def differences_of(task: Task) -> set[str]:
+    """Fields of the truth on which its small differences act."""
+    return {difference.field for case in task.cases for difference in case.differences}
 
 
 def recorded(asked: Sequence[Task]) -> list[Recorded]:

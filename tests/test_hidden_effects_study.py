@@ -3,12 +3,14 @@
 import json
 from dataclasses import replace
 
+import pytest
+
 from studies import hidden_study, versions
 from studies.hidden_answers import counted, widened
 from studies.hidden_benches import BENCHES, SERVO_DRIVE
 from studies.hidden_claims import outcome
 from studies.hidden_rows import Kind, Row, plain, row_again
-from studies.hidden_tasks import alone, tasks
+from studies.hidden_tasks import alone, differences_of, tasks, without
 from studies.kept import Kept
 from studies.study import Extent
 from workbench.rig import default_rig
@@ -45,6 +47,25 @@ def test_a_question_without_the_small_differences_is_another_one_of_the_same_siz
     assert task.cases[0].differences and not plain_case.differences
     assert (plain_case.size, plain_case.hidden) == (task.cases[0].size, task.hidden)
     assert alone(task).key != task.key
+
+
+def test_a_question_without_one_small_difference_has_all_others():
+    """What is named beside a pair may be one of them: a shift of the heat to walls that warm."""
+    task = next(t for t in tasks(Extent.FULL) if t.hidden == "constant_force + valve_lag")
+    cold = without(task, ["wall_k_per_j"])
+
+    assert "wall_k_per_j" in differences_of(task)
+    assert differences_of(cold) == differences_of(task) - {"wall_k_per_j"}
+    assert cold.key not in (task.key, alone(task).key)
+
+
+def test_a_difference_that_no_truth_has_is_refused(capsys, tmp_path):
+    asked = ["--kind", "pair", "--without", "wall_k", "-o", str(tmp_path / "out")]
+    with pytest.raises(SystemExit) as ended:
+        hidden_study.main(asked)
+
+    assert ended.value.code == 2 and not (tmp_path / "out").exists()
+    assert "wall_k_per_j" in capsys.readouterr().err
 
 
 def test_a_study_of_right_answers_holds_its_claims():
