@@ -103,9 +103,11 @@ def alone(task: Task) -> Task:
 
 def without(task: Task, fields: Collection[str]) -> Task:
     """The same question without these differences, by the field of the truth that they act on."""
-    left = (tuple(d for d in case.differences if d.field not in fields) for case in task.cases)
-    pairs = zip(task.cases, left, strict=True)
-    return replace(task, cases=tuple(replace(case, differences=d) for case, d in pairs))
+    cases = (
+        replace(case, differences=tuple(d for d in case.differences if d.field not in fields))
+        for case in task.cases
+    )
+    return replace(task, cases=tuple(cases))
 
 
 def differences_of(task: Task) -> set[str]:

@@ -45,8 +45,8 @@ def _told_apart(step: Addition, swaps: Sequence[Swap]) -> Iterator[str]:
 def _last_note(step: Addition, alone: bool, asked: Removal | None) -> str:
     """The note of one but for what is alike.
 
-    What another needs was not taken out, and has no share of its own; neither has what would not go
-    back to where it came from.
+    What another needs was not taken out, and has no share of its own; neither has what stays
+    though the held-out recording refuses it.
     """
     name, note = step.candidate.name, step.rig.notes[-1].removesuffix(alike_text(step.alike))
     then = falls(step.drop_train, step.drop_validation, step.evidence)

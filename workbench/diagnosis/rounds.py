@@ -189,11 +189,13 @@ def _round(done: Rounds, asked: _Asked) -> Rounds:
         asked.progress(f"accepted {diagnosis.ranking[0].candidate.name}")
         step = accept(current, diagnosis)
         return done.added(step, *(diagnosis for _ in step.candidate.singles))
-    try:
-        later = _further(done, current, _promising(diagnosis), asked)
-    except KeyboardInterrupt:
-        asked.progress("stopped one round further: what is finished stays")
-        return replace(done, stopped=True)
+    later, hopeful = done, _promising(diagnosis)
+    if hopeful is not None:
+        try:
+            later = _further(done, current, hopeful, asked)
+        except KeyboardInterrupt:
+            asked.progress(f"stopped beside {hopeful.candidate.name}: what is finished stays")
+            return replace(done, stopped=True)
     if diagnosis.contradicted and len(later.steps) == len(done.steps):
         asked.progress(f"stopped: {diagnosis.sentence}")
     return later
@@ -237,10 +239,8 @@ def _promising(diagnosis: Diagnosis) -> Ranked | None:
     return max(refused, key=lambda row: row.drop_train, default=None)
 
 
-def _further(done: Rounds, current: Rig, row: Ranked | None, asked: _Asked) -> Rounds:
+def _further(done: Rounds, current: Rig, row: Ranked, asked: _Asked) -> Rounds:
     """An effect with the next one that passes on top of it; as it was where they fail."""
-    if row is None:
-        return done
     first, refused = done.diagnoses[-1], row.candidate
     asked.progress(f"one round further with {refused.name}")
     steps = (*done.steps, addition_of(current, first, row))

@@ -93,8 +93,8 @@ def nominal_unknowns(
     is in ``added`` or a little of it is tolerated (``Cause.tolerated``).  What has a prior goes no
     further from it than ``believed`` of its deviations, or of the catalogue's where these are
     wider: a fit of a plant that lacks something is surer of its parameters than it should be.  What
-    was added goes on as far as there is, at the price of its prior: it came in while that was
-    missing.
+    was added goes on as far as there is, at the price of its prior: it came in while something else
+    was missing.
     """
     values, known, added = plant.values, plant.parameters, tuple(added)
     deviations, fixed = dict(deviations or {}), set(fixed)
