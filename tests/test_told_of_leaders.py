@@ -22,7 +22,7 @@ PROBLEM = SimpleNamespace(
 @pytest.fixture(autouse=True)
 def judged_on_what_all_share(monkeypatch):
     """No recording stands behind these fits."""
-    monkeypatch.setattr(settle, "_on_its_own_yardstick", lambda found: found)
+    monkeypatch.setattr(settle, "on_its_own_yardstick", lambda found: found)
 
 
 def proxy(candidate, *reasons):

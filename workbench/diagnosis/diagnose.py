@@ -26,6 +26,7 @@ from workbench.diagnosis.judge import (
     share_removed,
 )
 from workbench.diagnosis.law import better_base, empirical_law, standing
+from workbench.diagnosis.law_told import settled_law
 from workbench.diagnosis.located import Where
 from workbench.diagnosis.next_recording import recommended
 from workbench.diagnosis.pairs import with_pairs
@@ -214,6 +215,9 @@ def _concluded(
     if verdict in NAMING or (ranking and ranking[0].accepted):
         progress("sizes of what is named")
         ranking = with_settled_sizes(problem, ranking)
+    if law:
+        progress("sizes of the law")
+        law = settled_law(problem, law)
     best = ranking[0] if verdict in NAMING else None
     warned = unexplained(far, verdict, ranking)
     if best and best.fit and not best.fit.converged:

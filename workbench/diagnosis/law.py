@@ -19,6 +19,7 @@ from workbench.candidate import Candidate
 from workbench.diagnosis.judge import leaves_clearly_less, reasons_against, share_removed
 from workbench.diagnosis.law_choice import worth_scanning
 from workbench.diagnosis.law_seed import refitted, seeds
+from workbench.diagnosis.law_told import all_there, law_of
 from workbench.diagnosis.located import Where
 from workbench.diagnosis.refit import (
     Refit,
@@ -30,15 +31,11 @@ from workbench.diagnosis.refit import (
 from workbench.diagnosis.result import Law, LawTerm
 from workbench.diagnosis.rough import rough_fit
 from workbench.diagnosis.scan import Profile, scan
-from workbench.diagnosis.size import Size, distinct, sizes
-from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.problem import Problem, improved_base, misfit
-from workbench.law_range import seen_in
 from workbench.law_scales import scales
 from workbench.plant import Plant
 from workbench.recording import Recording
 from workbench.rig_laws import is_law, law_terms, laws_of, with_laws
-from workbench.units import display_scale, display_unit
 
 MOST_TERMS = 3
 LEAST_TERM_SHARE = 0.10  # of the misfit that another term must take
@@ -101,8 +98,8 @@ def _at_once(problem: Problem, terms: Sequence[Candidate], where: Where | None) 
         more = count - (len(best.steps) if best else 0)
         sound = not reasons_against(problem.base, found, parameters=count)
         enough = gained >= more * LEAST_TERM_SHARE
-        if sound and enough and _all_there(found.fit, [step.candidate for step in steps]):
-            best = _law(found, [*steps])
+        if sound and enough and all_there(found.fit, [step.candidate for step in steps]):
+            best = law_of(found, steps)
     return best
 
 
@@ -129,16 +126,11 @@ def _term_by_term(
             LawTerm(found.candidate, found.fit, found.validation, found.drop_train, unseen)
         )
         before = found.validation
-        if _all_there(found.fit, [step.candidate for step in steps]):
-            best = _law(counted, [*steps])
+        if all_there(found.fit, [step.candidate for step in steps]):
+            best = law_of(counted, steps)
         # The next term is scanned at this fit, and its drop still counts from the first base.
         problem = replace(problem, added=(*problem.added, found.candidate), base=found.fit)
     return best
-
-
-def _all_there(fit: Fit, terms: Iterable[Candidate]) -> bool:
-    """True where each term is distinct from none: one that is not only bends what others do."""
-    return all(map(distinct, sizes(fit, tuple(term.strength for term in terms)).values()))
 
 
 def with_terms(problem: Problem) -> Problem:
@@ -168,27 +160,3 @@ def _refitted(problem: Problem, chosen: Sequence[Candidate], to_beat: float) -> 
     if not profiles or profiles[0].drop <= to_beat:
         return None
     return refit_shaken(problem, refit(problem, rough_fit(problem, profiles[0])))
-
-
-def _law(best: Refit, steps: list[LawTerm]) -> Law:
-    accepted = [step.candidate for step in steps]
-    terms = sizes(best.fit, tuple(c.strength for c in accepted))
-    text = " and ".join(
-        f"a term in {c.cause.drivers[0]} on {c.place} of {_spoken(c.strength, size)}"
-        for c, size in zip(accepted, terms.values(), strict=True)
-    )
-    windows = best.fit.windows
-    ranges = seen_in(windows.plant.lean(keep=_members(accepted)), windows.recordings)
-    balances = tuple(dict.fromkeys(f"{c.place}.{c.cause.balance.value}" for c in accepted))
-    drops = (best.drop_train, best.drop_validation)
-    return Law(balances, terms, ranges, *drops, text, tuple(steps), best.fit, best.validation)
-
-
-def _spoken(name: str, size: Size) -> str:
-    """A coefficient with its unit and its deviation."""
-    per = 1.0 / display_scale(name).factor
-    return f"{per * size.value:.3g} ± {per * size.deviation:.2g} {display_unit(name)}"
-
-
-def _members(candidates: Iterable[Candidate]) -> list[str]:
-    return [candidate.member for candidate in candidates]

@@ -9,6 +9,7 @@ from workbench.diagnosis.addition import Addition, addition, freed, with_held_ou
 from workbench.diagnosis.diagnose import Progress, silent
 from workbench.diagnosis.evidence import weighed
 from workbench.diagnosis.law import better_base, empirical_law, plant_with_terms, standing
+from workbench.diagnosis.law_told import settled_law
 from workbench.diagnosis.result import Evidence, Law
 from workbench.diagnosis.scan import scan_catalogue
 from workbench.diagnosis.where import locate
@@ -46,6 +47,8 @@ def add_law(
         law = standing(problem, law)
     if law is None:
         raise ValueError(f"{rig.name}: {NO_LAW}")
+    progress("sizes of the law")
+    law = settled_law(problem, law)
     evidence = weighed(evidence, problem.base_validation)
     return accept_law(rig, law, errors_of(problem.base, problem.base_validation), evidence)
 

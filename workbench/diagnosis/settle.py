@@ -46,9 +46,9 @@ def with_settled_sizes(problem: Problem, ranking: tuple[Ranked, ...]) -> tuple[R
     )
 
 
-def settled(fit: Fit, candidate: Candidate) -> Fit:
-    """A fit with a candidate, repeated with weights of its own errors until its sizes stay."""
-    names = tuple(name for each in candidate.singles for name in each.moved)
+def settled(fit: Fit, *added: Candidate) -> Fit:
+    """A fit with what was added, repeated with weights of its own errors until its sizes stay."""
+    names = tuple(name for all_of in added for each in all_of.singles for name in each.moved)
     before = sizes(fit, names)
     for _ in range(ROUNDS):
         fit = weighed_anew(fit, ITERATIONS)
@@ -59,20 +59,20 @@ def settled(fit: Fit, candidate: Candidate) -> Fit:
     return fit
 
 
-def settled_leader(fit: Fit, candidate: Candidate) -> Fit:
-    """:func:`settled`, and its size looked for beside it too."""
-    strengths = tuple(each.strength for each in candidate.singles)
-    return resized(settled(fit, candidate), strengths, ITERATIONS)
+def settled_leader(fit: Fit, *added: Candidate) -> Fit:
+    """:func:`settled`, and its sizes looked for beside it too."""
+    strengths = tuple(each.strength for all_of in added for each in all_of.singles)
+    return resized(settled(fit, *added), strengths, ITERATIONS)
 
 
 def settled_refit(problem: Problem, found: Refit) -> Refit:
     """A refit with the fit of :func:`settled_leader`, or as it was; see :func:`_settled_row`."""
-    now = _with_fit(problem, found, settled_leader(found.fit, found.candidate))
+    now = with_fit(problem, found, settled_leader(found.fit, found.candidate))
     if now is found or (
         size_reasons(problem.base, now) and not reasons_against(problem.base, found)
     ):
         return found
-    return _on_its_own_yardstick(now)
+    return on_its_own_yardstick(now)
 
 
 def _settled_row(problem: Problem, row: Ranked, leads: bool) -> Ranked:
@@ -80,13 +80,13 @@ def _settled_row(problem: Problem, row: Ranked, leads: bool) -> Ranked:
 
     What was accepted for its size is not to be told with a fit of another.
     """
-    now = _with_fit(problem, row, (settled_leader if leads else settled)(row.fit, row.candidate))
+    now = with_fit(problem, row, (settled_leader if leads else settled)(row.fit, row.candidate))
     if now is row or (row.accepted and size_reasons(problem.base, now)):
         return row
-    return _on_its_own_yardstick(now) if leads else now
+    return on_its_own_yardstick(now) if leads else now
 
 
-def _with_fit(problem: Problem, found: Found, fit: Fit) -> Found:
+def with_fit(problem: Problem, found: Found, fit: Fit) -> Found:
     """The same found with another fit; as it was where that predicts worse than the base and it.
 
     What was accepted for predicting better is not to be told with a fit that does not.
@@ -104,7 +104,7 @@ def _with_fit(problem: Problem, found: Found, fit: Fit) -> Found:
     return found if worse else now
 
 
-def _on_its_own_yardstick(found: Found) -> Found:
+def on_its_own_yardstick(found: Found) -> Found:
     """The same, held-out start states fitted with the weights of its own errors.
 
     By those of the base, which misses far more, an output that the base could not follow counts for
