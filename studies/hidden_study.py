@@ -99,6 +99,16 @@ def _answer(work: tuple[Task, Recorded]) -> tuple[Task, Row]:
     return work[0], answered(*work)
 
 
+def _asked_for(asked: argparse.Namespace, task: Task) -> bool:
+    """True for a task of the kinds, plants, names and seeds that the command line names."""
+    return (
+        (asked.kind is None or task.kind.value in asked.kind)
+        and (asked.plant is None or task.plant in asked.plant)
+        and (asked.only is None or task.hidden in asked.only)
+        and (asked.seeds is None or task.seed in asked.seeds)
+    )
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Answer a part of the full grid; see the module."""
     parser = argparse.ArgumentParser(prog="python -m studies.hidden_study", description=__doc__)
@@ -113,14 +123,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--processes", type=int, default=PROCESSES)
     parser.add_argument("-o", "--output", type=Path, default=Path("studies_out/hidden-effects"))
     asked = parser.parse_args(arguments)
-    part = [
-        task
-        for task in tasks(Extent.FULL)
-        if (asked.kind is None or task.kind.value in asked.kind)
-        and (asked.plant is None or task.plant in asked.plant)
-        and (asked.only is None or task.hidden in asked.only)
-        and (asked.seeds is None or task.seed in asked.seeds)
-    ]
+    part = [task for task in tasks(Extent.FULL) if _asked_for(asked, task)]
     part = [alone(task) for task in part] if asked.alone else part
     if asked.without:
         known = set().union(*map(differences_of, part))
