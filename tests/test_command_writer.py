@@ -14,7 +14,6 @@ from workbench.rig import default_rig
 PLACE, COMMAND = "slide.position_m", "valve.command_v"
 
 
-@pytest.mark.filterwarnings("ignore:.*did you mean 'reference slide.position'")
 @pytest.mark.parametrize(
     "dialect",
     [

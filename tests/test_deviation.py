@@ -8,7 +8,7 @@ from gearbox_shifts import ALL_SHIFTS, run
 
 from workbench.comparison.course import course_of
 from workbench.comparison.deviation import deviation, shift_deviations
-from workbench.comparison.gear_shift import begins_energised
+from workbench.comparison.shifts import begins_energised
 from workbench.plants.gearbox import gearbox
 
 

@@ -268,6 +268,14 @@ def test_the_rig_file_says_where_a_value_comes_from_once(limits, sweep):
         assert word in note
 
 
+def test_a_sweep_through_one_limit_only_tells_nothing_of_the_other(sweep):
+    """It was taken, and a lower limit 31 deviations off was written."""
+    command = sweep["valve.command_v"]
+    (back,) = np.flatnonzero(np.diff(np.sign(command - command[0])) < 0.0)[:1]
+    with pytest.raises(InputError, match=r"the pressure falls by .* bar only"):
+        dead_zone(TANK, [sweep.part(0, int(back))])
+
+
 def test_a_curve_is_no_map_and_a_sweep_no_curve(curves, sweep):
     with pytest.raises(InputError, match=r"command moves at|is no map of the dead zone"):
         dead_zone(TANK, curves[:1])

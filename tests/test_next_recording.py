@@ -87,6 +87,7 @@ def test_every_manoeuvre_keeps_to_ranges_of_commands_and_of_recorded_places(
             given = row[np.isfinite(row)]
             assert np.all((given >= signal.lower) & (given <= signal.upper)), each.words
             assert not signal.levels or set(given) <= set(signal.levels), each.words
+            assert not signal.levels or np.all(given[:50] == min(signal.levels)), each.words
         if play.looped:
             for axis, row in zip(limits.axes, play.reference, strict=True):
                 assert row[0] == pytest.approx(axis.start)

@@ -151,6 +151,22 @@ def test_a_written_recording_reads_back(tmp_path):
     assert_same(read_recording(default_rig("servo_drive"), tmp_path / "out.csv"), rows)
 
 
+def test_what_the_workbench_wrote_is_read_whatever_columns_the_rig_has(tmp_path):
+    """A simulation was refused by the rig that it was simulated with."""
+    first = read(tmp_path, text(table()))
+    write_recording(first, tmp_path / "out.csv")
+    rig = load_rig(
+        'plant = "servo_drive"\n[recording]\ndecimal = ","\nseparator = ";"\n'
+        'time = {column = "t_ms", unit = "ms"}\n[recording.channels]\n'
+        '"valve.command" = {column = "u", unit = "mV"}\n'
+        '"slide.position" = {column = "x", unit = "mm", noise = "1 mm"}\n'
+    )
+    again = read_recording(rig, tmp_path / "out.csv")
+
+    assert_same(again, table())
+    assert again.noise == {"slide.position_m": 1e-3}
+
+
 def test_written_pieces_are_found_again(tmp_path):
     rows = table()
     whole = Recording("r", 1e-3, dict(zip(FULL, (rows[:, 1:] * FACTORS).T, strict=True)))

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from workbench.comparison.course import course_of
-from workbench.comparison.gear_shift import phases, shifts
+from workbench.comparison.gear_shift import phases
 from workbench.comparison.regimes import regimes
+from workbench.comparison.shifts import shifts, unfinished
 from workbench.plants import PLANTS
 from workbench.recording import Recording
 
@@ -210,7 +211,8 @@ def test_a_command_that_moves_nothing_is_no_shift(shifting):
     still = {**shifting.recording.channels}
     still["main_piston.position_m"] = np.zeros(len(shifting.recording))
 
-    assert shifts(course_of(shifting.whole, replace(shifting.recording, channels=still))) == ()
+    course = course_of(shifting.whole, replace(shifting.recording, channels=still))
+    assert shifts(course) == () and unfinished(course) == ()
 
 
 def test_a_shift_that_stays_between_two_gears_reached_none(shifting):
@@ -224,7 +226,38 @@ def test_a_shift_that_stays_between_two_gears_reached_none(shifting):
         "main_piston.position_m": DT * np.cumsum(speed),
     }
 
-    assert shifts(course_of(shifting.whole, replace(shifting.recording, channels=channels))) == ()
+    course = course_of(shifting.whole, replace(shifting.recording, channels=channels))
+    assert shifts(course) == () and unfinished(course) == (90,)
+
+
+@pytest.mark.parametrize("later", [439, 445, 470], ids=["at once", "before it moves", "moving"])
+def test_valves_that_open_one_after_the_other_begin_one_shift(shifting, later):
+    """Whichever comes first: what moves by it moves the lever before the other one acts."""
+    n = len(shifting.recording)
+    second = held((0, later), (1, 530 - later), (0, n - 530))
+    channels = {**shifting.recording.channels, "valve_2.command": second}
+    found = shifts(course_of(shifting.whole, replace(shifting.recording, channels=channels)))
+
+    assert [(shift.case, shift.first) for shift in found] == [("N to H", 90), ("H to N", 430)]
+
+
+def test_a_valve_that_has_held_the_gear_for_long_begins_no_shift(shifting):
+    n = len(shifting.recording)
+    first = held((0, 90), (1, 200), (0, 50), (1, 190), (0, n - 530))
+    channels = {**shifting.recording.channels, "valve_1.command": first}
+    course = course_of(shifting.whole, replace(shifting.recording, channels=channels))
+
+    assert [shift.first for shift in shifts(course)] == [90, 430]
+    assert unfinished(course) == ()
+
+
+def test_a_pulse_that_moved_nothing_is_not_where_the_next_shift_began(shifting):
+    n = len(shifting.recording)
+    second = held((0, 380), (1, 10), (0, 40), (1, 100), (0, n - 530))
+    channels = {**shifting.recording.channels, "valve_2.command": second}
+    found = shifts(course_of(shifting.whole, replace(shifting.recording, channels=channels)))
+
+    assert [shift.first for shift in found] == [90, 430]
 
 
 def test_a_plant_without_gears_has_no_phases(stroke):

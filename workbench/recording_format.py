@@ -21,6 +21,7 @@ from workbench.units import (
 
 SEPARATORS = {"tab": "\t", "space": " ", "whitespace": " "}
 GAPS = ("refuse", "split")
+REFERENCE = "reference "  # before the column of an output: what a position loop is to follow
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,6 @@ import numpy as np
 
 from workbench.comparison.course import Course, course_of
 from workbench.comparison.deviation import ShiftDeviation, shift_deviations
-from workbench.comparison.gear_shift import begins_energised
 from workbench.comparison.horizons import (
     FREE_RUN,
     JUDGED,
@@ -32,6 +31,7 @@ from workbench.comparison.horizons import (
 from workbench.comparison.maps import ErrorMap, command_maps, motion_maps
 from workbench.comparison.regimes import equally_weighted, regimes_of, shares
 from workbench.comparison.residuals import Residual, residual_of
+from workbench.comparison.shifts import begins_energised, unfinished
 from workbench.consistency import Finding, warned
 from workbench.fitting.errors import SignalError
 from workbench.fitting.noise_source import Noise, recorded_noise
@@ -42,6 +42,7 @@ from workbench.rig import Rig
 
 __all__ = ["FREE_RUN", "ONE_STEP", "PLAIN", "WINDOW", "compare", "signal_error"]
 
+MOST_TOLD = 6  # shifts that reached no gear
 WORST = 3  # windows that are marked
 LEAST_SHARE = 0.01  # of the squared error: a window with less is not marked
 
@@ -209,10 +210,22 @@ def _by_regime(course: Course, squared: np.ndarray) -> tuple[Regime, ...]:
 def _shifts(course: Course) -> tuple[tuple[ShiftDeviation, ...], list[str]]:
     early = "a shift began before the recording, or a piece of it, did: its deviation is not known"
     notes = [early] if begins_energised(course) else []
+    notes += _unfinished_in_words(course)
     try:
         return shift_deviations(course), notes
     except ArithmeticError as error:
         return (), [*notes, f"no deviation of the shifts: {error}"]
+
+
+def _unfinished_in_words(course: Course) -> list[str]:
+    """Shifts that reached no gear: the table of deviations has none of them."""
+    begun = unfinished(course)
+    if not begun:
+        return []
+    dt = course.recording.sample_time_s
+    told = ", ".join(f"{dt * first:.3f} s" for first in begun[:MOST_TOLD])
+    more = f" and {len(begun) - MOST_TOLD} more" if len(begun) > MOST_TOLD else ""
+    return [f"reached no other gear, and have no deviation: the shifts from {told}{more}"]
 
 
 def _pieces_in_words(recording: Recording) -> tuple[str, ...]:

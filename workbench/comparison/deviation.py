@@ -2,7 +2,7 @@
 
 eps = 1/T integral of |y - yhat| / (y_max - y_min) dt
 
-over a shift, from the change of the commands to where the position is reached.  The paper prints
+over a shift, from the energising that began it to where the position is reached.  The paper prints
 it without the absolute value, so that errors of both signs cancel; its numbers fit the form with it
 (erratum E003-5).  y_max and y_min are those of the recording within the shift.
 
@@ -20,11 +20,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from workbench.comparison.course import Course
-from workbench.comparison.gear_shift import Shift, shifts
+from workbench.comparison.shifts import SETTLED_S, Shift, shifts
 from workbench.fitting.holes import usual_gap
 from workbench.simulation import simulate
-
-LEAD_S = 0.02  # before a shift: valves and delays are at rest there, and their states known
 
 
 @dataclass(frozen=True)
@@ -76,7 +74,8 @@ def _deviation_of(course: Course, shift: Shift) -> ShiftDeviation:
     recording, plant = course.recording, course.plant
     dt = recording.sample_time_s
     begin = max(s for s in recording.starts if s <= shift.first)
-    begin = max(shift.first - max(round(LEAD_S / dt), 1), begin)
+    # so long before a shift valves and delays are at rest, and their states known
+    begin = max(shift.first - max(round(SETTLED_S / dt), 1), begin)
     found = simulate(plant, recording.part(begin, shift.last + 1), course.states[:, begin])
     inside = slice(shift.first, shift.last + 1)
     deviations = {}

@@ -1,4 +1,4 @@
-"""A gear shift in a recording: its phases, and from where to where it went.
+"""The phases of gear shifts in a recording.
 
 The detent has a notch every pitch of the lever's tip and pulls back hardest a quarter of a pitch
 away from one; the synchroniser blocks between two distances from Neutral on the way out.  With x
@@ -30,8 +30,6 @@ from workbench.effects.synchroniser import Synchroniser
 from workbench.lever import Lever
 
 REACH = 1.0 / 4.0  # of the pitch, on either side of a notch
-REACHED = 1.0 / 24.0  # of the pitch: half a millimetre, which friction leaves to the detent
-GEARS = {-1: "L", 0: "N", 1: "H"}
 BETWEEN = 99  # no notch
 PHASES = ("in neutral", "in gear", "release", "engaging", "synchronising", "travel")
 
@@ -43,15 +41,6 @@ class Gears:
     place: Place
     pitch_m: float
     zone_m: tuple[float, float] | None
-
-
-@dataclass(frozen=True)
-class Shift:
-    """From the sample at which the commands change to the one at which the gear is reached."""
-
-    case: str
-    first: int
-    last: int
 
 
 def gears_of(course: Course) -> Gears | None:
@@ -76,7 +65,7 @@ def phases(course: Course) -> dict[str, np.ndarray]:
     if gears is None:
         return {}
     x, moving = gears.place.value, gears.place.moving
-    notch = _notch(x, gears.pitch_m, REACH)
+    notch = notch_at(x, gears.pitch_m, REACH)
     found = {name: np.zeros(len(x), dtype=bool) for name in PHASES}
     for first, last in _visits(notch, course.recording.starts):
         rest = np.flatnonzero(moving[first:last] == 0) + first
@@ -94,59 +83,7 @@ def phases(course: Course) -> dict[str, np.ndarray]:
     return found
 
 
-def shifts(course: Course) -> tuple[Shift, ...]:
-    """Every change of the commands after which another gear was reached.
-
-    Where a piece begins with energised valves it is not known since when they are.
-    """
-    gears, on = gears_of(course), _energised(course)
-    if gears is None or not len(on):
-        return ()
-    changed = np.flatnonzero(np.any(on[:, 1:] != on[:, :-1], axis=0)) + 1
-    found = []
-    for begin, end in pairwise((*course.recording.starts, on.shape[1])):
-        inside = [int(k) for k in changed if begin < k < end]
-        for first, until in pairwise((*inside, end)):
-            waiting = next((k for k in inside if k > first and on[:, k].any()), end)
-            if on[:, first].any():
-                found.append(_shift(gears, first, until, waiting))
-    return tuple(shift for shift in found if shift)
-
-
-def begins_energised(course: Course) -> bool:
-    """True where a shift may have begun before the recording did, or a piece of it."""
-    on = _energised(course)
-    return gears_of(course) is not None and bool(on[:, list(course.recording.starts)].any())
-
-
-def _shift(gears: Gears, first: int, until: int, waiting: int) -> Shift | None:
-    """The shift that began at ``first``, ended by the next change, or else by the next energising.
-
-    The gear is reached where the position enters its neighbourhood for good; none is where it ends
-    within reach of no notch.
-    """
-    for end in (until, waiting):
-        near = _notch(gears.place.value[first:end], gears.pitch_m, REACHED)
-        if near[-1] != BETWEEN:
-            break
-    origin = round(float(gears.place.value[first]) / gears.pitch_m)
-    (target,) = _notch(gears.place.value[end - 1 : end], gears.pitch_m, REACH).tolist()
-    if target in (origin, BETWEEN):
-        return None
-    outside = np.flatnonzero(near != target)
-    last = min(first + int(outside[-1]) + 1, end - 1)
-    names = (GEARS.get(gear, f"{gear:+d}") for gear in (origin, target))
-    return Shift(" to ".join(names), first, last)
-
-
-def _energised(course: Course) -> np.ndarray:
-    """Which switched commands are on, shape (n_switched, n)."""
-    switched = [signal for signal in course.plant.commands if signal.levels]
-    rows = [course.recording[s.name] > sum(s.levels) / len(s.levels) for s in switched]
-    return np.array(rows, dtype=bool).reshape(len(rows), len(course.recording))
-
-
-def _notch(position_m: np.ndarray, pitch_m: float, share: float) -> np.ndarray:
+def notch_at(position_m: np.ndarray, pitch_m: float, share: float) -> np.ndarray:
     """Number of the notch within that share of the pitch, ``BETWEEN`` where there is none, (n,)."""
     nearest = np.round(position_m / pitch_m)
     near = np.abs(position_m - nearest * pitch_m) <= share * pitch_m

@@ -125,9 +125,17 @@ def _check_sweep(tank: TankOnValve, recording: Recording) -> None:
     steady_supply(recording)
     low_pa, high_pa = float(np.min(pressure)), float(np.max(pressure))
     expected = "a slow sweep of the command through both limits, which fills and empties the tank"
-    if high_pa - low_pa < REACHED * tank.span_pa(recording):
-        what = "is no map of the dead zone: the pressure moves by"
-        raise unfit(recording, f"{what} {(high_pa - low_pa) / 1e5:.2g} bar only", expected)
+    ways = {
+        "moves": high_pa - low_pa,
+        "rises": float(np.max(pressure - np.minimum.accumulate(pressure))),
+        "falls": float(np.max(np.maximum.accumulate(pressure) - pressure)),
+    }
+    for way, moved_pa in ways.items():
+        if moved_pa < REACHED * tank.span_pa(recording):
+            what = (
+                f"is no map of the dead zone: the pressure {way} by {moved_pa / 1e5:.2g} bar only"
+            )
+            raise unfit(recording, what, expected)
     smooth = np.convolve(command, np.ones(25) / 25, mode="valid")
     fastest_v_s = float(np.max(np.abs(np.diff(smooth)))) / recording.sample_time_s
     if fastest_v_s > FASTEST_V_S:

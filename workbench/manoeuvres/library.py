@@ -25,6 +25,7 @@ from workbench.manoeuvres.play import (
 )
 
 REST_S = 0.5  # before a ramp, which begins where the command rests
+OFF_S = 0.05  # before anything is switched on: of a shift under way nobody knows since when
 BEYOND = 0.1  # of what was recorded: how far a reference goes beyond a stop
 
 # Positions, through a position loop.
@@ -166,7 +167,10 @@ def pulses(limits: Limits, share: float) -> Play:
 
 
 def _switched(limits: Limits, patterns: np.ndarray) -> Play:
-    """Patterns of 0 and 1, (n_u, n), as the levels of each command."""
+    """Patterns of 0 and 1, (n_u, n), as the levels of each command, after a moment all off."""
+    later = min(round(OFF_S / limits.sample_time_s), limits.samples)
+    off = np.zeros((len(patterns), later))
+    patterns = np.hstack([off, patterns])[:, : limits.samples]
     rows = [
         np.where(row > 0.5, max(s.levels or (s.upper,)), min(s.levels or (s.lower,)))
         for s, row in zip(limits.commands, patterns, strict=True)

@@ -13,6 +13,7 @@ import numpy as np
 
 from workbench.plant import Plant
 from workbench.recording import Recording
+from workbench.recording_format import REFERENCE
 from workbench.rig import Rig
 from workbench.units import display_scale, public_name, scale
 from workbench.whole_file import whole_file
@@ -62,7 +63,7 @@ def _keyed(rig: Rig, recording: Recording, reference: Mapping[str, np.ndarray]) 
         channel = rig.reader.channels.get(name)
         unit = scale(channel.unit, name, rig.ambient_pa) if channel else display_scale(name)
         label = channel.column if channel and isinstance(channel.column, str) else public_name(name)
-        found.append((f"reference {label}", unit.from_si(values)))
+        found.append((f"{REFERENCE}{label}", unit.from_si(values)))
     return found
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from workbench.reading.plausible import warn_of_sensors
 from workbench.reading.table import RecordingWarning, Table
 from workbench.reading.time_unit import check_time_unit
 from workbench.recording import Recording
-from workbench.recording_format import derived_channels
+from workbench.recording_format import REFERENCE, default_format, derived_channels
 from workbench.rig import Rig
 from workbench.spelled_units import GAUGE, is_gauge, spelled
 from workbench.units import UnitError, public_name, scale
@@ -29,7 +30,8 @@ def read_recording(rig: Rig, path: Path | str) -> Recording:
     """The channels of a file in SI units, by full name, on one uniform time grid.
 
     Velocities that the plant wants as measured inputs, and the file lacks, are derived from the
-    position.  Doubtful sensors give a :class:`RecordingWarning`.
+    position.  Doubtful sensors give a :class:`RecordingWarning`.  A file as the workbench writes it
+    (:mod:`workbench.reading.writer`) is read by its own names, whatever those of the rig's files.
 
     Raises
     ------
@@ -38,6 +40,7 @@ def read_recording(rig: Rig, path: Path | str) -> Recording:
     """
     path = Path(path)
     table = table_of(path, rig.reader)
+    rig, table = _as_written_here(rig, table, path)
     columns = _columns(rig, table)
     _require_units(rig, table, columns)
     numbers = sorted(set(columns.values()))
@@ -63,6 +66,24 @@ def read_recording(rig: Rig, path: Path | str) -> Recording:
     warn_of_sensors(channels, outputs, table.file)
     unmapped = tuple(name for k, name in enumerate(table.names) if k not in numbers)
     return _recording(rig, path, channels, grid, unmapped)
+
+
+def _as_written_here(rig: Rig, table: Table, path: Path) -> tuple[Rig, Table]:
+    """The rig reading the workbench's own names, where the file has these and none of the rig's."""
+    reader, own = rig.reader, default_format(rig.plant)
+    if {*table.names} & {channel.column for channel in reader.channels.values()}:
+        return rig, table
+    try:
+        written = table_of(path, own)
+    except InputError:
+        return rig, table
+    needed = {public_name(signal.name) for signal in rig.plant.commands}
+    if not needed or not {"time", *needed} <= {*written.names}:
+        return rig, table
+    noise = {name: channel.noise for name, channel in reader.channels.items()}
+    channels = {name: replace(c, noise=noise.get(name)) for name, c in own.channels.items()}
+    own = replace(own, channels=channels, resample_s=reader.resample_s, gaps=reader.gaps)
+    return replace(rig, reader=own), written
 
 
 def _recording(
@@ -98,7 +119,7 @@ def _columns(rig: Rig, table: Table) -> dict[str, int]:
             found[name] = number
         elif not optional:
             wrong.append(number)
-        elif number.nearest and number.nearest not in named:
+        elif number.nearest not in {"", *named} and not number.nearest.startswith(REFERENCE):
             warnings.warn(f"{number}; left out", RecordingWarning, stacklevel=4)
     if not found:
         what = f"none of the columns of {rig.name} ({rig.plant.name}) is in this file"
