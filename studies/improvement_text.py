@@ -48,7 +48,9 @@ def improvement_text(found: Improvement, unit_of: Mapping[str, str]) -> str:
     ]
     parts = [columns(head, rows), *_lowered(found), ""]
     for k, diagnosis in enumerate(found.diagnoses, start=1):
-        parts += [f"diagnosis {k}: {diagnosis.sentence}{_taken_instead(diagnosis)}"]
+        last = found.law and diagnosis is found.diagnoses[-1]
+        instead = "" if last else _taken_instead(diagnosis)
+        parts += [f"diagnosis {k}: {diagnosis.sentence}{instead}"]
         parts += [f"  it warned then: {warning}" for warning in found.warned_then(diagnosis)]
         parts += [each.sentence for each in found.ahead if each.after == k]
     parts += [f"warning: {warning}" for warning in found.warnings]

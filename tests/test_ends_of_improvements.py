@@ -10,6 +10,7 @@ import pytest
 from test_diagnosis import bench, nothing
 from test_improvement import UNITS, improved, rig, sets, steps_of  # noqa: F401
 from test_laws_in_rigs import curved
+from test_report import LEAK, diagnosis, ranked
 
 from studies.improvement_text import STOPPED, improvement_document, improvement_text
 from studies.report.improvement import report_improvement
@@ -23,6 +24,7 @@ from workbench.diagnosis.improvement import Change, Stage
 from workbench.diagnosis.rounds import Rounds
 from workbench.diagnosis.verdict import not_converged, worsened
 from workbench.diagnosis.warned import Of, Warned
+from workbench.effect import Kind
 from workbench.fitting.errors import SignalError, errors_of, per_sample
 from workbench.fitting.posterior import Moved
 from workbench.rig import default_rig, load_rig
@@ -171,6 +173,19 @@ def test_an_effect_that_is_missing_after_the_second_thoughts_bars_a_law_and_is_t
     assert f"diagnosis 2: {found.diagnoses[-1].sentence}" in text
     assert found.rig.added == ("constant_force",)
     assert found.budget[-1].train == per_sample(found.fit)
+
+
+@pytest.mark.parametrize(
+    ("kind", "law", "first"),
+    [(Kind.EFFECT, True, True), (Kind.PARAMETER, True, False), (Kind.PARAMETER, False, True)],
+)
+def test_a_shift_does_not_come_in_where_a_law_explains_more(kind, law, first):
+    """The friction of a drive had gone 56 deviations off to stand for a drag that a law tells."""
+    row = replace(ranked(LEAK, 0.5, accepted=True), kind=kind, fit="its fit")
+    found = replace(diagnosis(), ranking=(row,), law="a law" if law else None)
+
+    assert rounds.accepts(found)
+    assert rounds.comes_first(found) is first
 
 
 def test_a_law_that_was_taken_is_not_offered(rig):

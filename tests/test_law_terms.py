@@ -82,6 +82,15 @@ def test_a_law_of_two_terms_names_both():
     assert law.drop_train > 0.95
 
 
+def test_a_law_is_told_where_an_effect_that_passes_leaves_most():
+    """A force that stood for a curve was called found, at 18 times the noise and without a word."""
+    found = diagnose(load_rig(BARE), *recorded(lambda x, v: wavy(x, v) - 6e3 * x**2))
+
+    assert found.ranking[0].accepted and found.ranking[0].drop_train < 0.5
+    assert found.verdict is Verdict.NOT_IN_CATALOGUE
+    assert {step.candidate.name for step in found.law.steps} == {SINE, CURVED}
+
+
 def test_a_new_term_is_written_into_a_rig_and_read_back_as_the_same_model():
     train, held_out = [made(1, wavy), made(3, wavy, 1e5)], [made(2, wavy, 4e5)]
     (step,) = add_law(load_rig(BARE), train, held_out)

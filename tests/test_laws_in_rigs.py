@@ -58,6 +58,13 @@ def curved(seed, gauge_pa=3e5, wider=1.0):
     return replace(found, channels={**found.channels, **channels})
 
 
+def wavy(recording):
+    """Another force beside, a sine of the place."""
+    force_n = 5.0 * np.sin(2 * np.pi * recording["rod.position_m"] / 0.06)
+    channels = {**recording.channels, "rod.force_n": recording["rod.force_n"] - force_n}
+    return replace(recording, channels=channels)
+
+
 @pytest.fixture(scope="module")
 def rig():
     return load_rig(BARE)
@@ -94,6 +101,20 @@ def test_where_nothing_of_the_catalogue_helps_the_law_is_taken_and_said_to_be_em
     assert "empirical" in improvement_text(lawful, UNITS)
     document = diagnosis_document(last, unit_names(found.plant.measured))
     assert document["law"]["add"] == [CURVED] and document["law"]["kind"] == "empirical"
+
+
+def test_what_a_law_leaves_nothing_to_goes_when_it_comes(rig):
+    """A force that had stood for the curve stayed in the rig file with 0.04 mN of its 2.5 N."""
+    sets = [wavy(curved(1)), wavy(curved(3, 1e5))], [wavy(curved(2, 4e5))]
+    found = improve(rig, *sets, law=True)
+
+    assert found.steps[0].candidate.name == "constant_force"
+    assert {*found.kept} == {*found.rig.added} == {"law[sin(2 pi x/L)]@rod", CURVED}
+    (gone,) = [each for each in found.removals if each.dropped]
+    assert gone.candidate.name == "constant_force" and "beside the law" in gone.reasons[0]
+    assert found.budget[-1].validation < 0.01 * found.budget[0].validation
+    text = improvement_text(found, UNITS)
+    assert "dropped: beside the law its size is negligible" in text
 
 
 def test_a_law_is_taken_only_where_it_is_asked_for(rig):

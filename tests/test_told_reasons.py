@@ -12,7 +12,7 @@ from studies.text_of_ranking import ranking_text, reasons
 from studies.text_of_results import diagnosis_text, moved_text
 from workbench.diagnosis.judge import HELD_OUT_REASON, SHARE_REASON
 from workbench.diagnosis.result import Verdict
-from workbench.diagnosis.verdict import BLIND_SHOWN, unexplained, worsened
+from workbench.diagnosis.verdict import BLIND_SHOWN, more_missing, unexplained, worsened
 from workbench.diagnosis.warned import Of, Warned
 from workbench.fitting.errors import SignalError
 from workbench.fitting.posterior import Moved
@@ -106,6 +106,18 @@ def test_a_no_beside_large_errors_names_what_the_recording_could_not_show():
     assert unexplained(FAR, Verdict.FOUND, blind) == ()
     assert unexplained(FAR, Verdict.SMALL_PROXY, [seen]) == (Warned(plain, Of.ERRORS_LEFT),)
     assert unexplained((), Verdict.NOTHING_MISSING, blind) == ()
+
+
+@pytest.mark.parametrize(
+    ("share", "left", "warns"), [(0.3, FAR, True), (0.9, FAR, False), (0.3, (), False)]
+)
+def test_what_leaves_much_far_above_the_noise_is_said_to_be_not_all(share, left, warns):
+    row = replace(ranked(LEAK, share, True), drop_validation=share)
+    said = [str(each) for each in more_missing(left, row)]
+
+    assert bool(said) is warns
+    assert all(FAR[0] in each and "more is missing" in each for each in said)
+    assert more_missing(left, None) == ()
 
 
 def test_a_balance_that_gains_hardly_anything_is_not_blamed():

@@ -45,6 +45,7 @@ from workbench.diagnosis.verdict import (
     far_above_noise,
     held,
     judged,
+    more_missing,
     not_converged,
     sentence,
     too_short,
@@ -64,6 +65,7 @@ from workbench.fitting.windows import MOST_WINDOWS
 from workbench.recording import Recording
 from workbench.rig import Rig
 
+MOST_SHARE = 0.5  # of the misfit: beside an effect that leaves more there may be a law
 KEEPS = 0.75  # of its drop in training, held out: an effect that keeps less may be an imitation
 
 Progress = Callable[[str], None]
@@ -168,18 +170,19 @@ def _law(
 
     A parameter that leaves its prior is no such effect: it may well imitate the law.  So the law
     is to leave a fifth less than every effect, and only less than the best shift; what fails
-    another criterion than its share is no rival.  The scan of an effect that keeps little of its
-    drop on what is held out bars no law, and neither does a share that a whole crowd removes: a
-    sagging cable is a force to four sensors, and its curve is what they leave.
+    another criterion than its share is no rival.  The scan of an effect that leaves half, or keeps
+    little of its drop on what is held out, bars no law, and neither does a share that a whole crowd
+    removes: a sagging cable is a force to four sensors, and its curve is what they leave.
     """
     leader = ranking[0] if ranking else None
     certain = leader and leader.accepted and leader.kind is Kind.EFFECT
     if leader and certain and not leader.crowd and share_removed(leader) >= CERTAIN_SHARE:
         return None
     progress("empirical law")
-    keeps = certain and not leader.drop_validation < KEEPS * leader.drop_train
+    most = certain and share_removed(leader) >= MOST_SHARE
+    keeps = most and not leader.drop_validation < KEEPS * leader.drop_train
     led_by = (p.drop for p in profiles if keeps and p.candidate == leader.candidate)
-    law = empirical_law(problem, profiles, max(led_by, default=0.0), None if certain else where)
+    law = empirical_law(problem, profiles, max(led_by, default=0.0), None if most else where)
     followed = [r for r in ranking if r.accepted or r.reasons == (SHARE_REASON,)]
     effects = [r for r in followed if r.kind is Kind.EFFECT]
     shift = max((r.drop_train for r in followed if r.kind is Kind.PARAMETER), default=0.0)
@@ -219,11 +222,12 @@ def _concluded(
         progress("sizes of the law")
         law = settled_law(problem, law)
     best = ranking[0] if verdict in NAMING else None
-    warned = unexplained(far, verdict, ranking)
+    named = law or best
+    left = far_above_noise(named.validation if named else None)
+    warned = unexplained(far, verdict, ranking) or more_missing(left, named)
     if best and best.fit and not best.fit.converged:
         what = f"the refit with {best.candidate.name}"
         warned = (not_converged(what, "its size may be off"), *warned)
-    named = law or best
     last, unseen = (named.fit, named.validation) if named else (None, None)
     before = errors_of(problem.base, problem.base_validation)
     after = errors_of(last, unseen) if last else {}

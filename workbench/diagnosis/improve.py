@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace
-from math import inf
+from math import inf, nan
 
 from workbench.comparison.free_run import free_run_errors
 from workbench.consistency import checked
@@ -21,9 +21,10 @@ from workbench.diagnosis.addition import Addition, accept, add, assembled
 from workbench.diagnosis.diagnose import Progress, diagnose, silent
 from workbench.diagnosis.improvement import Change, Improvement
 from workbench.diagnosis.last_notes import with_last_notes
-from workbench.diagnosis.law_addition import accept_law, add_law
-from workbench.diagnosis.passes import Passes
-from workbench.diagnosis.rounds import Rounds, accepts, forward
+from workbench.diagnosis.law_addition import accept_law, add_law, reasons_beside
+from workbench.diagnosis.passes import Kept, Passes, Removal, leaves_more
+from workbench.diagnosis.result import Diagnosis
+from workbench.diagnosis.rounds import Rounds, comes_first, forward
 from workbench.fitting.errors import Errors, errors_of
 from workbench.fitting.posterior import Moved, fitted_rig, moved_parameters
 from workbench.fitting.problem import NO_EVIDENCE, proves_nothing
@@ -43,7 +44,8 @@ def improve(
     """Diagnose and add until nothing in the catalogue earns its place, then think again.
 
     The effect added is the first of the ranking where it passes every criterion, also where an
-    empirical law would do better: a physical effect comes first.  What the held-out recording alone
+    empirical law would do better: a physical effect comes first.  A shift of a parameter does not
+    where a law is asked for: it may well imitate it.  What the held-out recording alone
     refuses may come in with the next one (:mod:`workbench.diagnosis.rounds`).  Where recording and
     rig contradict each other only two effects at once are added that end it; else what was added
     before stays.  With ``law`` an empirical law is taken in the end, where one passes the same
@@ -61,7 +63,7 @@ def improve(
     if proves_nothing(train, validation):
         raise ValueError(f"{NO_EVIDENCE}; expected another manoeuvre")
     kept = checked(rig, train, validation)
-    done = forward(Rounds(rig), train, validation, progress)
+    done = forward(Rounds(rig), train, validation, progress, law)
     if not done.stopped:
         done = _thought_over(done, *kept, progress)
     if law and not done.stopped:
@@ -136,18 +138,59 @@ def _with_law(
             progress("diagnosis of what is kept")
             last = diagnose(current, train, validation, progress)
             done = done.told(last).fitted_again(last)
-            done = replace(done, left_out=last.ranking[0].candidate.name if accepts(last) else "")
+            done = replace(
+                done, left_out=last.ranking[0].candidate.name if comes_first(last) else ""
+            )
     except KeyboardInterrupt:
         progress("stopped before the empirical law")
         return replace(done, stopped=True)
-    if last.law is None or accepts(last):
+    if last.law is None or comes_first(last):
         return done
+    try:
+        done, last = _without_needless(done, last, train, validation, progress)
+    except KeyboardInterrupt:
+        progress("stopped beside the empirical law")
+        return replace(done, stopped=True)
+    current = assembled(done.rig, done.kept.steps if done.kept else ())
     for step in accept_law(current, last.law, last.before, last.evidence):
         progress(f"empirical: {step.candidate.name}")
         done = replace(done, steps=(*done.steps, step))
         label = f"+ {step.candidate.name}"
         done = done.marked(label, step.fit, step.validation_fit, Change.LAW)
     return replace(done, law=last.law)
+
+
+def _without_needless(
+    done: Rounds,
+    last: Diagnosis,
+    train: Sequence[Recording],
+    validation: Sequence[Recording],
+    progress: Progress,
+) -> tuple[Rounds, Diagnosis]:
+    """What is kept without those to which a law leaves nothing, and the diagnosis with its law.
+
+    A force that stood for a curve is none any more beside the law that has it.  All stay where the
+    diagnosis without them tells no law, or a law that leaves more.
+    """
+    steps = done.kept.steps if done.kept else ()
+    gone = {s.candidate.name: why for s in steps if (why := reasons_beside(last, s, done.rig))}
+    if not gone:
+        return done, last
+    progress(f"diagnosis without {', '.join(gone)}, to which the law leaves nothing")
+    rest = tuple(step for step in steps if step.candidate.name not in gone)
+    again = diagnose(assembled(done.rig, rest), train, validation, progress)
+    if again.law is None or again.law.fit is None:
+        return done, last
+    kept = Kept(rest, again.base, again.base_validation)
+    had, has = (Kept((), law.fit, law.validation) for law in (last.law, again.law))
+    if leaves_more(had, has):
+        return done, last
+    out = (
+        Removal(s.candidate, nan, nan, gone[s.candidate.name], True) for s in steps if s not in rest
+    )
+    done = replace(done.told(again), kept=kept, removals=(*done.removals, *out))
+    label = ", ".join(f"- {name}" for name in gone)
+    return done.marked(label, kept.fit, kept.validation, Change.DROPPED), again
 
 
 def _improvement(

@@ -63,8 +63,9 @@ class Improvement:
     diagnoses
         One for each round, and one more where an effect that a round had refused came in with the
         next one, and where a law was asked for after the second thoughts had changed the model;
-        the last one accepted nothing, unless the user stopped it, no round was left, or that one
-        accepts an effect, which is ``left_out``.
+        one more where a law left nothing to an effect; the last one accepted nothing, unless the
+        user stopped it, no round was left, that one accepts an effect, which is ``left_out``, or
+        its law stands in the place of what it accepts.
     ahead
         What was tried for one round more, also in vain.
     removals, swaps

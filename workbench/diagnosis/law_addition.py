@@ -4,14 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from math import nan
 
+from workbench.diagnosis.absent import is_new
 from workbench.diagnosis.addition import Addition, addition, freed, with_held_out
 from workbench.diagnosis.diagnose import Progress, silent
 from workbench.diagnosis.evidence import weighed
+from workbench.diagnosis.judge import size_reasons
 from workbench.diagnosis.law import better_base, empirical_law, plant_with_terms, standing
 from workbench.diagnosis.law_told import settled_law
-from workbench.diagnosis.result import Evidence, Law
+from workbench.diagnosis.refit import Refit
+from workbench.diagnosis.result import Diagnosis, Evidence, Law
 from workbench.diagnosis.scan import scan_catalogue
+from workbench.diagnosis.size import sizes
 from workbench.diagnosis.where import locate
 from workbench.fitting.errors import Errors, errors_of
 from workbench.fitting.problem import BELIEVED, pose
@@ -70,3 +75,17 @@ def accept_law(
         rig = replace(freed(rig, step), notes=step.rig.notes)
         before = step.after
     return tuple(steps)
+
+
+def reasons_beside(found: Diagnosis, step: Addition, rig: Rig) -> tuple[str, ...]:
+    """Why an effect that was added to a rig is nothing beside the law of a later diagnosis.
+
+    Empty where it keeps a size of its own there.  A shift of a parameter is not asked: the rig as
+    it was diagnosed has its prior where it was shifted to.
+    """
+    law, candidate = found.law, step.candidate
+    if law is None or law.fit is None or found.base is None or not is_new(rig, candidate):
+        return ()
+    there = sizes(law.fit, (candidate.strength,))
+    beside = Refit(candidate, law.fit, law.validation, there, nan, nan, nan)
+    return tuple(f"beside the law {reason}" for reason in size_reasons(found.base, beside))

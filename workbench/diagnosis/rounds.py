@@ -147,6 +147,7 @@ class _Asked:
     train: Sequence[Recording]
     validation: Sequence[Recording]
     progress: Progress
+    law: bool
 
     def diagnosis(self, rig: Rig) -> Diagnosis:
         """One round over a rig."""
@@ -158,12 +159,14 @@ def forward(
     train: Sequence[Recording],
     validation: Sequence[Recording],
     progress: Progress,
+    law: bool,
 ) -> Rounds:
     """Rounds of diagnosis and addition, until nothing is accepted any more.
 
-    An interrupt keeps what finished rounds added; before the first it is passed on.
+    With ``law`` an empirical law is taken in the end, and no shift comes in where one explains
+    more.  An interrupt keeps what finished rounds added; before the first it is passed on.
     """
-    asked = _Asked(train, validation, progress)
+    asked = _Asked(train, validation, progress, law)
     for count in range(1, MOST_ROUNDS + 1):
         try:
             progress(f"round {count}")
@@ -185,7 +188,7 @@ def _round(done: Rounds, asked: _Asked) -> Rounds:
     current = assembled(done.rig, done.steps)
     diagnosis = asked.diagnosis(current)
     done = done.told(diagnosis).fitted_again(diagnosis)
-    if accepts(diagnosis):
+    if comes_first(diagnosis) if asked.law else accepts(diagnosis):
         asked.progress(f"accepted {diagnosis.ranking[0].candidate.name}")
         step = accept(current, diagnosis)
         return done.added(step, *(diagnosis for _ in step.candidate.singles))
@@ -218,6 +221,16 @@ def accepts(diagnosis: Diagnosis) -> bool:
     if best is None or diagnosis.contradicted:
         return False
     return best.fit is not None and best.accepted
+
+
+def comes_first(diagnosis: Diagnosis) -> bool:
+    """True where what is accepted is to come in before an empirical law that explains more.
+
+    A physical effect is; a parameter that leaves its prior may well imitate the law.
+    """
+    return accepts(diagnosis) and not (
+        diagnosis.law and diagnosis.ranking[0].kind is Kind.PARAMETER
+    )
 
 
 def _promising(diagnosis: Diagnosis) -> Ranked | None:

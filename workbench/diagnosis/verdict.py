@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from workbench.diagnosis.judge import LEAST_PROXY, SHARE_REASON, share_removed
+from workbench.diagnosis.judge import CERTAIN_SHARE, LEAST_PROXY, SHARE_REASON, share_removed
 from workbench.diagnosis.power import too_weak
 from workbench.diagnosis.result import NAMING, Evidence, Law, Ranked, Verdict, told
 from workbench.diagnosis.scan import WIDER, Profile
@@ -108,6 +108,18 @@ def unexplained(
     told = f"unexplained errors remain on held-out windows: {', '.join(far)}"
     if verdict is not Verdict.RECORDING_TOO_WEAK and any(row.blind for row in ranking):
         told = f"{told}; {_blind(ranking)}"
+    return (Warned(told, Of.ERRORS_LEFT),)
+
+
+def more_missing(left: Sequence[str], named: Ranked | Law | None) -> tuple[Warned, ...]:
+    """A warning where what is named leaves much of the misfit, far above the noise.
+
+    Then it is not all that is missing, and may itself stand for something else.
+    """
+    if named is None or not left or share_removed(named) >= CERTAIN_SHARE:
+        return ()
+    told = f"held-out errors are still far above their noise with it: {', '.join(left)}"
+    told = f"{told}; more is missing, and it may stand for something else"
     return (Warned(told, Of.ERRORS_LEFT),)
 
 
