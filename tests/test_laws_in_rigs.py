@@ -170,6 +170,8 @@ def test_a_law_can_be_added_by_name_and_as_a_whole(rig):
         add_law(rig, [bench(1, nothing)], [bench(2, nothing)])
     with pytest.raises(ValueError, match="has it already"):
         add(one.rig, CURVED, train, held_out)
+    with pytest.raises(ValueError, match="added one at a time, or all as `law`"):
+        add(rig, f"{CURVED} + law[1]@rod", train, held_out)
 
 
 def test_every_term_of_every_plant_acts_and_is_absent_at_null(plant):

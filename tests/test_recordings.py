@@ -151,6 +151,14 @@ def test_a_written_recording_reads_back(tmp_path):
     assert_same(read_recording(default_rig("servo_drive"), tmp_path / "out.csv"), rows)
 
 
+def test_a_command_beyond_its_range_is_said(tmp_path):
+    """The plant takes its end: 14 V did what 10 V do, without a word."""
+    rows = table()
+    rows[100:120, 1] = 12.0 / FACTORS[0]
+    with pytest.warns(RecordingWarning, match=r"valve\.command: goes to 12 V, beyond 0 V to 10 V, in 20"):
+        read(tmp_path, text(rows))
+
+
 def test_what_the_workbench_wrote_is_read_whatever_columns_the_rig_has(tmp_path):
     """A simulation was refused by the rig that it was simulated with."""
     first = read(tmp_path, text(table()))

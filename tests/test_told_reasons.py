@@ -12,7 +12,13 @@ from studies.text_of_ranking import ranking_text, reasons
 from studies.text_of_results import diagnosis_text, moved_text
 from workbench.diagnosis.judge import HELD_OUT_REASON, SHARE_REASON
 from workbench.diagnosis.result import Verdict
-from workbench.diagnosis.verdict import BLIND_SHOWN, more_missing, unexplained, worsened
+from workbench.diagnosis.verdict import (
+    BLIND_SHOWN,
+    more_missing,
+    refused_rivals,
+    unexplained,
+    worsened,
+)
 from workbench.diagnosis.warned import Of, Warned
 from workbench.fitting.errors import SignalError
 from workbench.fitting.posterior import Moved
@@ -118,6 +124,25 @@ def test_what_leaves_much_far_above_the_noise_is_said_to_be_not_all(share, left,
     assert bool(said) is warns
     assert all(FAR[0] in each and "more is missing" in each for each in said)
     assert more_missing(left, None) == ()
+
+
+@pytest.mark.parametrize(
+    ("train", "why", "warns"),
+    [
+        (0.88, (HELD_OUT_REASON,), True),
+        (0.7, (HELD_OUT_REASON,), False),
+        (0.88, ("negligible",), False),
+    ],
+)
+def test_a_rival_that_only_the_held_out_recording_refuses_is_said(train, why, warns):
+    """Half of the demo's recording named a leak of the spool, which stood for the piston's."""
+    named = replace(ranked(LAG, 0.32, True), fit="its fit")
+    rival = replace(refused(*why, train=train, held_out=-0.02), fit="its fit")
+
+    said = [str(each) for each in refused_rivals((named, rival), named)]
+    assert bool(said) is warns
+    assert all("chamber_leak@chamber_a (88%)" in each for each in said)
+    assert refused_rivals((rival,), None) == ()
 
 
 def test_a_balance_that_gains_hardly_anything_is_not_blamed():

@@ -161,12 +161,12 @@ def improve(
         units = unit_names(known.plant.measured + known.plant.optional_outputs)
         write_rig(found.rig, output)
         write_json(json, improvement_document(found, units))
+        typer.echo(improvement_text(found, units))
+        typer.echo(f"wrote {output}")
         if report:
             from studies.report.improvement import report_improvement
 
             say(f"report in {report_improvement(found, report, command_text())}")
-        typer.echo(improvement_text(found, units))
-        typer.echo(f"wrote {output}")
         if found.stopped:
             raise typer.Exit(STOPPED)
 

@@ -82,6 +82,8 @@ def add(
         If most samples of an output cannot be simulated with it.
     """
     train, validation, evidence = with_held_out(rig, train, validation)
+    if TOGETHER in name and any(map(is_law, name.split(TOGETHER))):
+        raise ValueError(f"{name}: terms of a law are added one at a time, or all as `law`")
     if is_law(name):
         rig = replace(rig, plant=plant_with_terms(rig.plant, train, [name]))
     plant = rig.fit_for(train[0])

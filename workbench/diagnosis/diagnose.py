@@ -47,6 +47,7 @@ from workbench.diagnosis.verdict import (
     judged,
     more_missing,
     not_converged,
+    refused_rivals,
     sentence,
     too_short,
     too_short_text,
@@ -225,6 +226,7 @@ def _concluded(
     named = law or best
     left = far_above_noise(named.validation if named else None)
     warned = unexplained(far, verdict, ranking) or more_missing(left, named)
+    warned += refused_rivals(ranking, best)
     if best and best.fit and not best.fit.converged:
         what = f"the refit with {best.candidate.name}"
         warned = (not_converged(what, "its size may be off"), *warned)

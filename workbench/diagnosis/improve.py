@@ -68,8 +68,7 @@ def improve(
         done = _thought_over(done, *kept, progress)
     if law and not done.stopped:
         done = _with_law(done, train, validation, progress)
-    progress("free runs")
-    return _improvement(done, *kept)
+    return _improvement(done, *kept, progress)
 
 
 def _thought_over(
@@ -194,7 +193,10 @@ def _without_needless(
 
 
 def _improvement(
-    done: Rounds, train: Sequence[Recording], validation: Sequence[Recording]
+    done: Rounds,
+    train: Sequence[Recording],
+    validation: Sequence[Recording],
+    progress: Progress,
 ) -> Improvement:
     """The result, with errors before and after and all that the final fit moved."""
     first = done.diagnoses[0]
@@ -213,6 +215,7 @@ def _improvement(
     noise = dict(zip(windows.plant.measured, windows.noise.tolist(), strict=True))
     free: tuple[Errors, Errors] = {}, {}
     try:
+        progress("free runs")
         free = free_run_errors(done.rig, sets, noise), free_run_errors(final, sets, noise)
     except KeyboardInterrupt:  # all else is finished
         done = replace(done, stopped=True)

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from workbench.diagnosis.judge import CERTAIN_SHARE, LEAST_PROXY, SHARE_REASON, share_removed
+from workbench.diagnosis.judge import (
+    CERTAIN_SHARE,
+    LEAST_PROXY,
+    SHARE_REASON,
+    held_out_refuses,
+    leaves_clearly_less,
+    share_removed,
+)
 from workbench.diagnosis.power import too_weak
 from workbench.diagnosis.result import NAMING, Evidence, Law, Ranked, Verdict, told
 from workbench.diagnosis.scan import WIDER, Profile
@@ -121,6 +128,27 @@ def more_missing(left: Sequence[str], named: Ranked | Law | None) -> tuple[Warne
     told = f"held-out errors are still far above their noise with it: {', '.join(left)}"
     told = f"{told}; more is missing, and it may stand for something else"
     return (Warned(told, Of.ERRORS_LEFT),)
+
+
+def refused_rivals(ranking: Sequence[Ranked], named: Ranked | None) -> tuple[Warned, ...]:
+    """A warning of what leaves far less in training, where the held-out recording alone refuses it.
+
+    A few windows refuse the right one too; then what they accept instead stands for it.
+    """
+    rivals = [
+        f"{row.candidate.name} ({told(row.drop_train):.0%})"
+        for row in ranking
+        if named is not None and row.fit is not None and held_out_refuses(row.reasons)
+        and row.drop_train >= CERTAIN_SHARE
+        and leaves_clearly_less(row.drop_train, named.drop_train)
+    ]  # fmt: skip
+    if not rivals:
+        return ()
+    said = f"far more of the training misfit goes with {', '.join(rivals)}"
+    text = (
+        f"{said}, refused by what is held out alone: ask another recording before either is named"
+    )
+    return (Warned(text, Of.MODEL),)
 
 
 def worsened(before: Errors, after: Errors) -> tuple[Warned, ...]:

@@ -41,6 +41,7 @@ VACUUM_PA = 1e3  # an absolute pressure below this is one that counts from ambie
 SUPPLY = "supply.pressure_pa"
 ROOM = 0.25  # a chamber goes that far below ambient and above supply, as shares of each
 BEYOND = 1.5  # of the range of a command: more cannot be that command
+CLIPPED = 0.02  # of that range, beyond which a command is no longer what the plant takes
 RUN = 50  # equal values in a row that make a sensor suspect, where it usually changes
 
 
@@ -133,6 +134,24 @@ def warn_of_sensors(channels: Mapping[str, np.ndarray], outputs: set[str], file:
         for each in said:
             text = f"{file}: {public_name(name)}: {each}"
             warnings.warn(text, RecordingWarning, stacklevel=3)
+
+
+def warn_of_commands(channels: Mapping[str, np.ndarray], plant: Plant, file: str) -> None:
+    """Warn of commands beyond their range: the plant takes them as its end."""
+    for signal in plant.commands:
+        values = channels.get(signal.name)
+        room = CLIPPED * (signal.upper - signal.lower)
+        if values is None or signal.levels or not np.isfinite(room):
+            continue
+        outside = (values > signal.upper + room) | (values < signal.lower - room)
+        if not outside.any():
+            continue
+        low, high = (_shown(signal.name, end) for end in (signal.lower, signal.upper))
+        count, first = int(outside.sum()), int(outside.argmax()) + 1
+        far = _shown(signal.name, values[outside][np.argmax(np.abs(values[outside]))])
+        text = f"goes to {far}, beyond {low} to {high}, in {count} samples from sample {first} on"
+        said = f"{file}: {public_name(signal.name)}: {text}; the plant takes the end of its range"
+        warnings.warn(said, RecordingWarning, stacklevel=3)
 
 
 def saturation_text(name: str, values: np.ndarray, at_ends: np.ndarray) -> str:

@@ -14,7 +14,7 @@ from workbench.plant import Plant
 from workbench.reading.formats import table_of
 from workbench.reading.grid import Grid, missing_stretch, uniform_grid
 from workbench.reading.outliers import impossible, warn_of_outliers, without_infinite
-from workbench.reading.plausible import warn_of_sensors
+from workbench.reading.plausible import warn_of_commands, warn_of_sensors
 from workbench.reading.table import RecordingWarning, Table
 from workbench.reading.time_unit import check_time_unit
 from workbench.recording import Recording
@@ -64,6 +64,7 @@ def read_recording(rig: Rig, path: Path | str) -> Recording:
     for velocity, position in derived.items():
         channels[velocity] = derivative(channels[position], grid.sample_time_s, grid.starts)
     warn_of_sensors(channels, outputs, table.file)
+    warn_of_commands(channels, rig.plant, table.file)
     unmapped = tuple(name for k, name in enumerate(table.names) if k not in numbers)
     return _recording(rig, path, channels, grid, unmapped)
 
