@@ -155,7 +155,7 @@ def test_a_command_beyond_its_range_is_said(tmp_path):
     """The plant takes its end: 14 V did what 10 V do, without a word."""
     rows = table()
     rows[100:120, 1] = 12.0 / FACTORS[0]
-    with pytest.warns(RecordingWarning, match=r"valve\.command: goes to 12 V, beyond 0 V to 10 V, in 20"):
+    with pytest.warns(RecordingWarning, match=r"goes to 12 V, beyond 0 V to 10 V, in 20"):
         read(tmp_path, text(rows))
 
 
