@@ -27,7 +27,7 @@ GEARS = {-1: "L", 0: "N", 1: "H"}
 
 @dataclass(frozen=True)
 class Shift:
-    """From the sample at which the commands change to the one at which the gear is reached."""
+    """From the sample of the energising that began it to the one at which the gear is reached."""
 
     case: str
     first: int
