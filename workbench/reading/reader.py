@@ -72,7 +72,8 @@ def read_recording(rig: Rig, path: Path | str) -> Recording:
 def _as_written_here(rig: Rig, table: Table, path: Path) -> tuple[Rig, Table]:
     """The rig reading the workbench's own names, where the file has these and none of the rig's."""
     reader, own = rig.reader, default_format(rig.plant)
-    if {*table.names} & {channel.column for channel in reader.channels.values()}:
+    columns = {channel.column for channel in reader.channels.values()}
+    if {*table.names} & columns or any(isinstance(column, int) for column in columns):
         return rig, table
     try:
         written = table_of(path, own)
