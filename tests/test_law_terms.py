@@ -4,6 +4,7 @@ The truth of the bench is written in plain numpy, here and in ``test_diagnosis``
 """
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -89,6 +90,13 @@ def test_a_law_is_told_where_an_effect_that_passes_leaves_most():
     assert found.ranking[0].accepted and found.ranking[0].drop_train < 0.5
     assert found.verdict is Verdict.NOT_IN_CATALOGUE
     assert {step.candidate.name for step in found.law.steps} == {SINE, CURVED}
+
+
+def test_where_no_balance_gains_by_an_unknown_input_there_is_no_law(monkeypatch):
+    """A constant flow at the noise of a joint that lacked nothing was one: it creeps a little."""
+    monkeypatch.setattr(diagnosing, "empirical_law", lambda *asked: pytest.fail("asked"))
+
+    assert diagnosing._law(None, (), [], SimpleNamespace(certain=False), lambda said: None) is None
 
 
 def test_a_new_term_is_written_into_a_rig_and_read_back_as_the_same_model():

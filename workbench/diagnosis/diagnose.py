@@ -174,7 +174,12 @@ def _law(
     another criterion than its share is no rival.  The scan of an effect that leaves half, or keeps
     little of its drop on what is held out, bars no law, and neither does a share that a whole crowd
     removes: a sagging cable is a force to four sensors, and its curve is what they leave.
+
+    A law is an unknown input to a balance: where none of them gains by any course of one there is
+    none, and what a law removes is what small differences leave near the noise.
     """
+    if where is not None and not where.certain:
+        return None
     leader = ranking[0] if ranking else None
     certain = leader and leader.accepted and leader.kind is Kind.EFFECT
     if leader and certain and not leader.crowd and share_removed(leader) >= CERTAIN_SHARE:
