@@ -178,22 +178,6 @@ def test_an_improvement_is_told_as_text_and_as_a_document(improved):
     assert row["before"] == 0.0 and row["before_std"] is None and row["after_std"] > 0
 
 
-@pytest.mark.parametrize(
-    ("came", "said"),
-    [
-        ({"replaced": True}, "takes its place"),
-        ({"leaves_more": True}, "both errors would grow"),
-        ({}, "not clearly better"),
-    ],
-)
-def test_a_rival_is_told_with_what_came_of_it(improved, came, said):
-    swap = replace(improved.swaps[0], **{"replaced": False, "leaves_more": False, **came})
-    text = improvement_text(replace(improved, swaps=(swap,)), UNITS)
-    (line,) = [line for line in text.splitlines() if f"or {swap.rival.name}" in line]
-
-    assert line.endswith(said)
-
-
 def test_shares_and_parameters_are_told_alike_as_text_and_as_a_document(improved):
     first, *others = improved.removals
     moved = Moved("rod.mass_kg", 2.0, 2.5, 0.01, 0.2)

@@ -109,6 +109,22 @@ def test_a_pair_and_a_swap_have_the_verdict_of_their_own(improved):
     assert "validation rises from 600 to 700" in said and "training" not in said
 
 
+@pytest.mark.parametrize(
+    ("came", "said"),
+    [
+        ({"replaced": True}, "takes its place"),
+        ({"leaves_more": True}, "both errors would grow"),
+        ({}, "not clearly better"),
+    ],
+)
+def test_a_rival_is_told_with_what_came_of_it(improved, came, said):
+    swap = replace(improved.swaps[0], **{"replaced": False, "leaves_more": False, **came})
+    text = improvement_text(replace(improved, swaps=(swap,)), UNITS)
+    (line,) = [line for line in text.splitlines() if f"or {swap.rival.name}" in line]
+
+    assert line.endswith(said)
+
+
 def test_an_effect_that_is_dropped_although_bars_rise_is_told(improved):
     candidate = improved.steps[0].candidate
     worse = Removal(candidate, 0.08, 0.05, reasons=(HELD_OUT_REASON,), dropped=True)

@@ -11,21 +11,20 @@ import pytest
 from test_diagnosis import bench, nothing
 
 from workbench.diagnosis import diagnose as diagnosing
-from workbench.diagnosis import law_addition, law_told
+from workbench.diagnosis import law_addition
 from workbench.diagnosis.diagnose import diagnose
 from workbench.diagnosis.judge import share_removed
 from workbench.diagnosis.law import _at_once, better_base, empirical_law, standing, with_terms
 from workbench.diagnosis.law_addition import NO_LAW, add_law
 from workbench.diagnosis.law_choice import worth_scanning
-from workbench.diagnosis.law_told import law_of, settled_law
+from workbench.diagnosis.law_told import law_of
 from workbench.diagnosis.refit import refit_from
 from workbench.diagnosis.result import LawTerm, Verdict
 from workbench.diagnosis.scan import scan_catalogue
-from workbench.diagnosis.size import Size, distinct, sizes
+from workbench.diagnosis.size import Size, distinct
 from workbench.effects.law_features import Factor, Here, product, written
 from workbench.fitting.gauss_newton import fit_windows
 from workbench.fitting.linearised import Point
-from workbench.fitting.own_errors import effective_by_output
 from workbench.fitting.problem import pose
 from workbench.law_scales import scales
 from workbench.plants import PLANTS
@@ -205,37 +204,6 @@ def test_a_diagnosis_begins_again_from_the_prior_fit_that_a_law_found(monkeypatc
     assert len(asked) == 2
     assert found.base.cost == pytest.approx(problem.base.cost, rel=1e-3)
     assert [*found.law.terms] == [f"{SINE}.size_n"]
-
-
-def mean_square(fit):
-    """The squared error of a sample by the weights of its own fit."""
-    return float(np.sum(fit.residual**2) / np.sum(effective_by_output(fit.windows)))
-
-
-def test_a_law_is_told_as_its_own_errors_weigh_it():
-    problem = posed(wavy)
-    law = asked_law(problem)
-    told = settled_law(problem, law)
-    (step,) = told.steps
-
-    assert mean_square(law.fit) < 0.05 and mean_square(law.validation) < 0.05
-    assert mean_square(told.fit) == pytest.approx(1.0, rel=0.2)
-    assert mean_square(told.validation) == pytest.approx(1.0, rel=0.2)
-    assert (step.fit, step.validation) == (told.fit, told.validation)
-    assert (told.drop_train, told.drop_validation) == (law.drop_train, law.drop_validation)
-    assert told.terms == sizes(told.fit, [*law.terms])
-
-
-def test_a_law_is_not_told_with_a_fit_that_has_it_no_more(monkeypatch):
-    problem = posed(wavy)
-    law = asked_law(problem)
-    gone = law.fit.point.t.copy()
-    gone[law.fit.unknowns.names.index(f"{SINE}.size_n")] = 0.0
-    none = Point(gone, law.fit.point.starts)
-    without = fit_windows(law.fit.windows, law.fit.unknowns, none, iterations=0)
-    monkeypatch.setattr(law_told, "settled_leader", lambda *_: without)
-
-    assert settled_law(problem, law) == law
 
 
 def test_each_term_of_a_law_that_is_read_off_is_there(monkeypatch):

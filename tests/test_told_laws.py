@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from test_law_terms import SINE, STROKE_M, law_of, posed, wavy
+from test_law_terms import SINE, STROKE_M, asked_law, posed, wavy
 
 from studies.text_of_law import law_document, law_text
 from workbench.law_range import beyond, seen_in
@@ -14,7 +14,7 @@ from workbench.units import public_name
 
 @pytest.fixture(scope="module")
 def law():
-    return law_of(posed(wavy))
+    return asked_law(posed(wavy))
 
 
 def test_a_law_can_be_evaluated_from_its_document(law):

@@ -45,12 +45,11 @@ def improve(
 
     The effect added is the first of the ranking where it passes every criterion, also where an
     empirical law would do better: a physical effect comes first.  A shift of a parameter does not
-    where a law is asked for: it may well imitate it.  What the held-out recording alone
-    refuses may come in with the next one (:mod:`workbench.diagnosis.rounds`).  Where recording and
-    rig contradict each other only two effects at once are added that end it; else what was added
-    before stays.  With ``law`` an empirical law is taken in the end, where one passes the same
-    criteria.  An interrupt after the first finished round ends the work there, with what is
-    finished.
+    where a law is asked for: it may well imitate it.  What the held-out recording alone refuses may
+    come in with the next one (:mod:`workbench.diagnosis.rounds`).  Where recording and rig
+    contradict each other only two effects at once are added that end it; else what was added before
+    stays.  With ``law`` an empirical law is taken in the end, where one passes the same criteria.
+    An interrupt after the first finished round ends the work there, with what is finished.
 
     Raises
     ------
@@ -169,24 +168,26 @@ def _without_needless(
     """What is kept without those to which a law leaves nothing, and the diagnosis with its law.
 
     A force that stood for a curve is none any more beside the law that has it.  All stay where the
-    diagnosis without them tells no law, or a law that leaves more.
+    diagnosis without them tells no law, or one that leaves more, and where what stays needs one.
     """
     steps = done.kept.steps if done.kept else ()
     gone = {s.candidate.name: why for s in steps if (why := reasons_beside(last, s, done.rig))}
     if not gone:
         return done, last
-    progress(f"diagnosis without {', '.join(gone)}, to which the law leaves nothing")
     rest = tuple(step for step in steps if step.candidate.name not in gone)
-    again = diagnose(assembled(done.rig, rest), train, validation, progress)
+    bare = assembled(done.rig, rest)
+    if not all(bare.plant.ready_for(step.candidate) for step in rest):
+        return done, last
+    progress(f"diagnosis without {', '.join(gone)}, to which the law leaves nothing")
+    again = diagnose(bare, train, validation, progress)
     if again.law is None or again.law.fit is None:
         return done, last
     kept = Kept(rest, again.base, again.base_validation)
     had, has = (Kept((), law.fit, law.validation) for law in (last.law, again.law))
     if leaves_more(had, has):
         return done, last
-    out = (
-        Removal(s.candidate, nan, nan, gone[s.candidate.name], True) for s in steps if s not in rest
-    )
+    taken = (step.candidate for step in steps if step.candidate.name in gone)
+    out = (Removal(each, nan, nan, gone[each.name], True) for each in taken)
     done = replace(done.told(again), kept=kept, removals=(*done.removals, *out))
     label = ", ".join(f"- {name}" for name in gone)
     return done.marked(label, kept.fit, kept.validation, Change.DROPPED), again

@@ -16,6 +16,7 @@ from workbench.recording import Recording
 STEADY_V = 0.02  # a command that stays within is constant
 LEAST_LEAD = 5  # samples with the valve still closed
 LEAD_S = 0.1  # before the opening: so far back a straight line is taken through the pressure
+ROUNDED = 1e-9  # of a pressure, over a lead: less drift is rounding, where there is no noise
 DRIFTS = 0.05  # chance at which noise alone would slope as much: below, it is a drift
 LEAST_SAMPLES = 30
 CLEARLY_V = 0.2  # that far outside the dead zone a path is open
@@ -123,7 +124,8 @@ def _at_the_opening(lead_pa: np.ndarray, sample_time_s: float) -> float:
     before = np.arange(len(near)) - len(near)
     (slope, end_pa), covariance = np.polyfit(before, near, 1, cov=True)
     clear = stdtrit(len(near) - 2, 1.0 - DRIFTS / 2.0)
-    drifts = abs(slope) > clear * np.sqrt(covariance[0, 0])
+    rounded = ROUNDED * np.abs(near).max() / len(near)
+    drifts = abs(slope) > max(clear * np.sqrt(covariance[0, 0]), rounded)
     return float(end_pa if drifts else near.mean())
 
 
