@@ -190,14 +190,21 @@ def flow_text(found: FlowFit) -> str:
         rows.append(
             (
                 curve.label,
-                shown(curve.area_m2.value, "area_m2"),
-                *(f"{e.value:.4f} +- {e.deviation:.4f}" for e in curve.shape.values()),
+                *_path(curve),
                 shown(curve.mean_absolute_error, "error_pa", 2),
                 shown(error_pa, "error_pa", 2),
                 _ended(curve),
             )
         )
     return columns(("curve", "C_d A", "b", "a", "m", "MAE", "MAE, rig", ""), rows)
+
+
+def _path(curve: TankCurve) -> tuple[str, ...]:
+    """Area and shape of the path of a curve; one that carries no flow shows no shape."""
+    if curve.shut:
+        return ("shut", *("-" for _ in curve.shape))
+    shape = (f"{each.value:.4f} +- {each.deviation:.4f}" for each in curve.shape.values())
+    return (shown(curve.area_m2.value, "area_m2"), *shape)
 
 
 def _ended(curve: TankCurve) -> str:

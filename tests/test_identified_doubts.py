@@ -78,20 +78,22 @@ def test_a_value_at_a_bound_is_marked_as_no_result():
 def test_a_curve_tells_which_of_its_values_ended_at_a_bound():
     shape = ("critical_ratio", "cracking_ratio", "subsonic_index")
     common = {"label": "charging", "along": LINE, "measured": LINE, "fitted": LINE}
-    values = {key: Estimate(key, 0.05, 0.15) for key in ("area_m2", *shape)}
+    values = {key: Estimate(key, 0.05, 0.15) for key in shape} | {"area_m2": Estimate("", 0.2, 0.1)}
     curve = TankCurve(command_v=8.0, charging=True, at_bound=shape[:1], **common, **values)
     found = identified(RATIO, 0.3, "servo_reservoir")
+    shut = replace(curve, at_bound=(), area_m2=Estimate("", 1e-22, 0.1))
     fit = FlowFit(
         rig=found.rig, estimates=(), parameters=(),
-        curves=(curve, replace(curve, at_bound=())), rig_errors_pa=(1.0, 1.0),
+        curves=(curve, replace(curve, at_bound=()), shut), rig_errors_pa=(1.0, 1.0, 1.0),
     )  # fmt: skip
 
     lines = identified_text(PROCEDURES["flow"], fit).splitlines()
 
     assert lines[1].endswith("b at a bound") and "at a bound" not in lines[2]
-    assert "1 of 2 curves have values at the end of their range" in lines[-1]
+    assert lines[3].split() == ["charging", "shut", "-", "-", "-", *lines[2].split()[-4:]]
+    assert "1 of 3 curves have values at the end of their range" in lines[-1]
     curves = identification_document(PROCEDURES["flow"], fit)["curves"]
-    assert [each["at_bound"] for each in curves] == [["critical_ratio"], []]
+    assert [each["at_bound"] for each in curves] == [["critical_ratio"], [], []]
     assert Curve(**common).at_bound == ()
 
 

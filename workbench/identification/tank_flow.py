@@ -75,6 +75,11 @@ class TankCurve(Curve):
         """The shape of the flow function, by the letters of the paper."""
         return {"b": self.critical_ratio, "a": self.cracking_ratio, "m": self.subsonic_index}
 
+    @property
+    def shut(self) -> bool:
+        """No flow is seen at this command: the shape of the path is what the rig said of it."""
+        return self.area_m2.value <= self.area_m2.deviation
+
 
 @dataclass(frozen=True, kw_only=True)
 class FlowFit(Identified):
