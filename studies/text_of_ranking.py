@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from math import isfinite
 
-from studies.text import columns, number, percent, removed, spread
+from studies.text import columns, number, percent, removed, shown, spread
 from workbench.diagnosis.judge import (
     HELD_OUT_REASON,
     LEAST_HELD_OUT,
@@ -16,6 +16,7 @@ from workbench.diagnosis.judge import (
 )
 from workbench.diagnosis.result import Diagnosis, Ranked
 from workbench.effect import Kind
+from workbench.units import public_name
 
 SHOWN_RANKS = 12
 DROPS = "drop: share of the weighted misfit beyond noise that goes away, on either set"
@@ -59,9 +60,14 @@ def _order_of_ties(ranking: Sequence[Ranked]) -> str:
 
 
 def sizes_text(row: Ranked) -> str:
-    """Strength and forms with their standard deviations."""
-    sizes = (spread(size.value, size.deviation, name, 3) for name, size in row.size.items())
-    return ", ".join(sizes) or "-"
+    """Strength and forms with their standard deviations, forms by name; what a rig had instead."""
+    strength = next(iter(row.size), "")
+    sizes = []
+    for name, size in row.size.items():
+        form = "" if name == strength else f"{public_name(name).rpartition('.')[2]} "
+        sizes.append(form + spread(size.value, size.deviation, name, 3))
+    rig = f", rig {shown(row.rig_value, strength, 3)}" if isfinite(row.rig_value) else ""
+    return ", ".join(sizes) + rig if sizes else "-"
 
 
 def _remark(row: Ranked, found: Diagnosis) -> str:

@@ -18,7 +18,6 @@ from workbench.effect import (
     Cause,
     Conditions,
     Expression,
-    Kind,
     Part,
     Received,
     form,
@@ -87,6 +86,7 @@ class Leg(Part):
 
     with M as printed in physics.md 2.3, to which a point mass at the foot is added, and C from the
     Christoffel symbols of M:  C q' = d(M q')/dq q' - 1/2 d(q' M q')/dq.  G is an effect of its own.
+    A payload is an effect, too, and no shift of the shank's mass, whose centre is at half length.
 
     Source: paper 001 (the engine's solid cylinders); physics.md 2.3: masses and radii are chosen.
     """
@@ -97,8 +97,6 @@ class Leg(Part):
             strength="added_mass_kg",
             balance=Balance.MOMENTUM,
             drivers=("acceleration", "angle"),
-            kind=Kind.PARAMETER,
-            held="shank_mass_kg",
             shown_by="slow sweep of each joint, and fast steps",
             source="physics.md section 6 (payload)",
         ),

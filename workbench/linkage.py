@@ -21,7 +21,6 @@ from workbench.effect import (
     Conditions,
     Expression,
     Force,
-    Kind,
     Part,
     Received,
     State,
@@ -172,7 +171,8 @@ class Link(Part):
     J = m L^2/3 + J_0 + dm L^2,    omega' = tau / J
 
     The angle counts from the horizontal.  ``along`` is how far the weights lie out sideways, mass
-    times distance, and ``across`` how far up: what gravity needs to know.
+    times distance, and ``across`` how far up: what gravity needs to know.  A payload is an effect
+    and no shift of the mass m: it counts with L^2 where that counts with L^2/3.
 
     Source: physics.md 2.2 (masses chosen: a light tube; J_0 for what sits at the joint).
     """
@@ -183,8 +183,6 @@ class Link(Part):
             strength="added_mass_kg",
             balance=Balance.MOMENTUM,
             drivers=("acceleration", "angle"),
-            kind=Kind.PARAMETER,
-            held="mass_kg",
             shown_by="slow sweep of the joint, and fast steps",
             source="physics.md section 6 (payload)",
         ),

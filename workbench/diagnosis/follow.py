@@ -89,8 +89,7 @@ def follow(
             refits.append(refit(problem, each))
     refits = _lowest(refits, _from_priors(problem, imitated, begun, refits, progress))
     moved = shifts(problem)
-    least = WORTH_A_SHIFT * max((each.drop_train for each in refits), default=0.0)
-    for shift in [each for each in moved if each.leaves and each.drop > least][:SHIFTS_REFITTED]:
+    for shift in _shifts_to_refit(moved, where, refits):
         progress(f"refit with {public_name(shift.name)} free")
         refits.append(refit_shift(problem, shift, _best_share(refits)))
     refits = _lowest_of_each(problem, refits, earlier)
@@ -116,6 +115,23 @@ def _to_refit(begun: Sequence[Rough], where: Where | None) -> list[Rough]:
 
 def _acts_there(begun: Rough, where: Where | None) -> bool:
     return where is not None and acts_in(begun.profile.candidate, where.balance)
+
+
+def _shifts_to_refit(
+    moved: Sequence[Shift], where: Where | None, refits: Sequence[Refit]
+) -> list[Shift]:
+    """The best of what leaves its prior and promises enough, or acts where something is lacking.
+
+    What a shift promises is a guess of the linear model: of a friction that was held at a third of
+    its size it said a fifth of the misfit, where nearly all of it was to go.
+    """
+    least = WORTH_A_SHIFT * max((each.drop_train for each in refits), default=0.0)
+
+    def promising(each: Shift) -> bool:
+        there = where is not None and acts_in(each.candidate, where.balance)
+        return each.drop > least or (there and each.drop > WORTH_A_LOOK)
+
+    return [each for each in moved if each.leaves and promising(each)][:SHIFTS_REFITTED]
 
 
 def _lowest_of_each(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from math import nan
 
 from workbench.candidate import Candidate
 from workbench.diagnosis.judge import HELD_OUT_REASON, reasons_against
@@ -46,7 +47,7 @@ def ranked(
     order = [*together, *(name for name in rows if name not in together)]
     followed = [rows[name] for name in order if predicts_row(rows[name])]
     refused = [rows[name] for name in order if not predicts_row(rows[name])]
-    rest = [_shifted(shift) for shift in moved if shift.candidate.name not in rows]
+    rest = [_shifted(problem, shift) for shift in moved if shift.candidate.name not in rows]
     rest += [_scanned_row(problem, p, begun) for p in profiles if p.candidate.name not in rows]
     rest.sort(key=lambda row: -row.drop_train)
     asked = (*followed, *refused, *rest)
@@ -116,10 +117,10 @@ def refitted_row(
 ) -> Ranked:
     """The row of a refit; a single effect has the profile of its scan, a parameter has none."""
     against = reasons_against(problem.base, each)
-    pair = len(each.candidate.singles) > 1
+    shift = profile is None and len(each.candidate.singles) == 1
     row = Ranked(
         candidate=each.candidate,
-        kind=Kind.EFFECT if profile or pair else Kind.PARAMETER,
+        kind=Kind.PARAMETER if shift else Kind.EFFECT,
         size=each.size,
         drop_train=each.drop_train,
         drop_validation=each.drop_validation,
@@ -130,13 +131,14 @@ def refitted_row(
         reasons=against,
         plain_validation=each.plain_validation,
         plain_chance=each.plain_chance,
+        rig_value=problem.rig.plant.values[next(iter(each.size))] if shift else nan,
         fit=each.fit,
         validation=each.validation,
     )
     return _with_scan(problem, row, profile) if profile else row
 
 
-def _shifted(shift: Shift) -> Ranked:
+def _shifted(problem: Problem, shift: Shift) -> Ranked:
     """A shift that was not refitted counts by what freeing it would bring."""
     stays = (f"{public_name(shift.name)} stays within {LEAVES_PRIOR:g} deviations of its prior",)
     return Ranked(
@@ -150,6 +152,7 @@ def _shifted(shift: Shift) -> Ranked:
         decided_by=DecidedBy.SCAN,
         accepted=False,
         reasons=("only a shift of a fitted parameter",) if shift.leaves else stays,
+        rig_value=problem.rig.plant.values[shift.name],
     )
 
 

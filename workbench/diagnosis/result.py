@@ -93,6 +93,9 @@ class Ranked:
         Size in typical sizes from which this recording would show it; NaN where that is not known.
     crowd
         Of the leader: those beyond the printed tie that cannot be told apart from it either.
+    rig_value
+        Of a shift: what the rig says of the parameter that it moves, the first of ``size``; else
+        NaN.
     fit, validation
         The refit and the same plant on the held-out recordings; None where it was not followed.
     """
@@ -114,6 +117,7 @@ class Ranked:
     imitated_by: Mapping[str, float] = field(default_factory=dict)
     drop_wide: float = float("nan")
     modification_index: float = float("nan")
+    rig_value: float = float("nan")
     fit: Fit | None = field(default=None, repr=False)
     validation: Fit | None = field(default=None, repr=False)
 

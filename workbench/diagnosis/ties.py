@@ -43,11 +43,12 @@ def tie_group(
     held-out recording too, unless one leaves several times as much of the misfit of either, as a
     fifth where the other leaves only noise, or fails to predict by more than a few held-out
     windows.  Among the tied those that pass every criterion come first, effects before parameters
-    that would lie far off what is known of them, and among these the one leads with the
-    least left of both recordings together, where nuisances may hardly bend for any: either
-    recording alone orders rivals by what its few events happen to show, and where nuisances are
-    free, what is left tells how far they bent.  But where one leaves at least a fifth less of the
-    held-out misfit, and not in a few windows alone, free and near the priors, that recording
+    that would lie far off what is known of them, unless these leave clearly less of either
+    recording, and among these the one leads with the least left of both recordings together, where
+    nuisances may hardly bend for any: either recording alone orders rivals by what its few events
+    happen to show, and where nuisances are free, what is left tells how far they bent.  But where
+    one leaves at least a fifth less of the held-out misfit, and not in a few windows alone, free
+    and near the priors, that recording
     decides.  Those that look most like the leader stand next to it: were it wrong, it would stand
     for one of them.
 
@@ -58,8 +59,7 @@ def tie_group(
     tied.sort(key=lambda each: against[id(each)])
     sound = [each for each in tied if not against[id(each)]] or tied[:LARGEST_TIE]
     tied = tied[: max(len(sound), LARGEST_TIE)]
-    effects = [each for each in sound if each.candidate.name in profiles] or sound
-    leader = _leader(problem, effects, nearer)
+    leader = _leader(problem, _may_lead(sound, profiles), nearer)
     others = [each for each in tied if each is not leader]
     others.sort(key=lambda r: (r not in sound, -abs(_alignment_of(leader, r, profiles))))
     return [leader, *others]
@@ -80,6 +80,22 @@ def _close(refits: Sequence[Refit], profiles: Mapping[str, Profile]) -> list[Ref
         if gap < (CLOSE_DROP_SAME if same else CLOSE_DROP):
             tied.append(other)
     return tied
+
+
+def _may_lead(sound: Sequence[Refit], profiles: Mapping[str, Profile]) -> list[Refit]:
+    """Effects, and of shifts (no profile) those that leave clearly less of both sets than these.
+
+    A friction of which there is more than the rig says was told as one that grows with pressure.
+    """
+    effects = [each for each in sound if each.candidate.name in profiles]
+    shifts = [each for each in sound if each.candidate.name not in profiles]
+    return [*effects, *(s for s in shifts if all(_leaves_less_of_both(s, e) for e in effects))]
+
+
+def _leaves_less_of_both(one: Refit, other: Refit) -> bool:
+    return leaves_clearly_less(one.drop_train, other.drop_train) and leaves_clearly_less(
+        one.drop_validation, other.drop_validation
+    )
 
 
 def _far_worse(other: Refit, best: Refit) -> bool:

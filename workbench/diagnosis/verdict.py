@@ -16,6 +16,7 @@ from workbench.diagnosis.power import too_weak
 from workbench.diagnosis.result import NAMING, Evidence, Law, Ranked, Verdict, told
 from workbench.diagnosis.scan import WIDER, Profile
 from workbench.diagnosis.warned import Of, Warned
+from workbench.effect import Kind
 from workbench.fitting.errors import Errors, errors_of
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.posterior import held_back
@@ -29,6 +30,7 @@ BEYOND = f"would go further than {BELIEVED:g} deviations from what the rig belie
 FEWEST_WINDOWS = 2  # fitted, of a plant that moves: some effect makes up for any one stroke
 BLIND_SHOWN = 4  # names of what a recording cannot show
 HELD_SHOWN = 3  # names of what is held
+OF_ALL = "of the weighted misfit"
 
 
 def judged(
@@ -210,8 +212,12 @@ def _said(verdict: Verdict, ranking: tuple[Ranked, ...], law: Law | None) -> str
     name, share = _spoken(leader), f"{told(leader.drop_train):.0%}"
     if verdict is Verdict.FOUND:
         if len(leader.candidate.singles) > 1:
-            return f"{name} are missing: they remove {share} of the weighted misfit"
-        return f"{name} is missing: it removes {share} of the weighted misfit"
+            return f"{name} are missing: they remove {share} {OF_ALL}"
+        if leader.kind is Kind.PARAMETER:
+            moved = public_name(next(iter(leader.size)))
+            off = f"{name}: {moved} is not what the rig says"
+            return f"{off}; another value removes {share} {OF_ALL}"
+        return f"{name} is missing: it removes {share} {OF_ALL}"
     if verdict is Verdict.SMALL_PROXY:
         return f"{name} explains {share} of the misfit and may stand for something else"
     if not leader.tied_with:

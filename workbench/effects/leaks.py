@@ -8,6 +8,15 @@ from dataclasses import dataclass
 from workbench.air import NozzleLaw, path_between
 from workbench.effect import Balance, Cause, Conditions, Effect, Expression, MassFlow, strength
 
+CHAMBER_LEAK = Cause(
+    name="chamber_leak",
+    strength="area_m2",
+    balance=Balance.MASS,
+    drivers=("chamber pressure",),
+    shown_by="fill slowly (gas at room temperature), close, log the pressure for minutes",
+    source="papers 002 Fig. 15, 004; physics.md section 6 (leak_ambient)",
+)
+
 
 @dataclass(frozen=True, kw_only=True)
 class ChamberLeak(Effect):
@@ -19,16 +28,7 @@ class ChamberLeak(Effect):
     (leak_ambient).
     """
 
-    causes = (
-        Cause(
-            name="chamber_leak",
-            strength="area_m2",
-            balance=Balance.MASS,
-            drivers=("chamber pressure",),
-            shown_by="fill slowly (gas at room temperature), close, log the pressure for minutes",
-            source="papers 002 Fig. 15, 004; physics.md section 6 (leak_ambient)",
-        ),
-    )
+    causes = (CHAMBER_LEAK,)
 
     chamber: str
     area_m2: Expression = strength(typical=3e-7, upper=1e-5)

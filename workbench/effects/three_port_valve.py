@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 
@@ -19,6 +19,7 @@ from workbench.effect import (
     form,
     strength,
 )
+from workbench.effects.leaks import CHAMBER_LEAK
 from workbench.effects.spool_causes import (
     DISCHARGE_ASYMMETRY,
     EXHAUST_RESTRICTION,
@@ -186,11 +187,23 @@ class ParametricValve(SpoolOpening):
     no overlap it is the linear map 2 c - 1.  K A = 1.  a counts times 1 + e for filling and 1 - e
     for venting.
 
+    A hole in the bellows, and a spool that seals neither path, are open all the time by a share of
+    the full opening.  What is typical and most of them is that of :class:`ThreePortValve` and of
+    :class:`ChamberLeak`, over its full area.
+
     Source: paper 004 Eqs. 5 and 6; tau 0.05 s (area map) and 0.075 s (linear map) are fitted to
-    the first-principles model in physics.md 2.6.
+    the first-principles model in physics.md 2.6; leaks by physics.md section 6 in terms of f.
     """
 
+    causes = (
+        *SpoolOpening.causes,
+        replace(SPOOL_LEAK, strength="spool_leak_share"),
+        replace(CHAMBER_LEAK, strength="chamber_leak_share"),
+    )
+
     time_constant_s: Expression = form(0.05, lower=1e-3, upper=5.0, relative_deviation=0.05)
+    spool_leak_share: Expression = strength(typical=0.004, upper=0.2)
+    chamber_leak_share: Expression = strength(typical=0.012, upper=0.4)
 
     def terms(self, now: Conditions) -> Iterator[PressureRate]:
         own_pa = now[self.chamber].pressure_pa
@@ -198,6 +211,8 @@ class ParametricValve(SpoolOpening):
         net = fill - vent
         filling = (1.0 + self.discharge_asymmetry) * ca.fmax(net, 0.0)
         venting = (1.0 - self.discharge_asymmetry) * ca.fmin(net, 0.0)
+        filling += self.spool_leak_share
+        venting -= self.spool_leak_share + self.chamber_leak_share
         driven_pa = filling * (now["supply"].pressure_pa - own_pa)
         driven_pa += venting * (own_pa - now["atmosphere"].pressure_pa)
         yield PressureRate(self.chamber, driven_pa / self.time_constant_s)
