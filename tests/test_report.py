@@ -126,6 +126,8 @@ def test_an_error_below_the_noise_is_no_more_than_the_whole_misfit_gone():
     text = diagnosis_text(replace(found, ranking=rows), UNITS)
     assert re.search(r"chamber_leak@chamber_a +100\.0 % +100\.0 %", text)
     assert "removes 100% of the weighted misfit" in sentence(Verdict.FOUND, rows, None)
+    nearly = (replace(rows[0], drop_train=0.997), *rows[1:])
+    assert "removes 99.7% of the weighted misfit" in sentence(Verdict.FOUND, nearly, None)
 
 
 def test_what_is_no_number_is_null_in_json():

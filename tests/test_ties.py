@@ -227,3 +227,26 @@ def test_of_the_tied_the_one_leads_that_leaves_least_near_the_priors(
 
     assert len(group) == 2
     assert group[0] is rivals[leads]
+
+
+@pytest.mark.parametrize(
+    ("train", "held_out", "leads"),
+    [(0.96, 0.95, True), (0.96, 0.80, False), (0.82, 0.95, False)],
+    ids=["of both", "of training alone", "of the held-out alone"],
+)
+def test_a_shift_leads_an_effect_only_where_it_leaves_clearly_less_of_both_recordings(
+    problem, followed, sound, train, held_out, leads
+):
+    """A friction greater than the rig says was told as one that grows with pressure."""
+    own = next(p for p in followed.profiles if p.candidate == sound.candidate)
+    effect = replace(sound, drop_train=0.86, drop_validation=0.86)
+    shift = replace(named(sound, followed, 0), drop_train=train, drop_validation=held_out)
+    first = sorted([effect, shift], key=lambda each: -each.drop_train)
+    lower = replace(shift, fit=replace(shift.fit, cost=0.0))
+
+    def nearer(_, each):
+        return lower if each is shift else each
+
+    group = tie_group(problem, first, {own.candidate.name: own}, nearer)
+
+    assert len(group) == 2 and (group[0] is shift) is leads

@@ -50,6 +50,8 @@ def test_a_name_ends_in_its_unit_and_the_longest_counts(name, public, unit):
         ("2 N/bar", "friction.pressure_factor_n_pa", 2e-5),
         ("1 %", "friction.presliding_share", 0.01),
         ("0.25", "friction.presliding_share", 0.25),
+        ("0.25 -", "friction.presliding_share", 0.25),
+        ("0.25 dimensionless", "friction.presliding_share", 0.25),
         (1, "friction.presliding_share", 1.0),
     ],
 )

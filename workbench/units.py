@@ -17,6 +17,7 @@ from workbench.errors import nearest
 from workbench.spelled_units import GAUGE, spelled
 
 STANDARD_ATMOSPHERE_PA = 101325.0
+NO_UNIT = frozenset({"1", "-", "dimensionless"})  # what tables write where there is none
 
 _UNITS = {
     # suffix: (SI unit, unit for people)
@@ -253,6 +254,8 @@ def _scale(unit: str, target: str, typed: str, wanted: str) -> Scale:
         return Scale()
     if unit in {"%", "percent"} and not target:
         return Scale(divisor=100.0)
+    if unit in NO_UNIT and not target:
+        return Scale()
     if not target:
         raise UnitError(f"unit '{typed}' on a dimensionless quantity; expected a plain number")
     import pint

@@ -15,7 +15,7 @@ from workbench.diagnosis.judge import reasons_against
 from workbench.diagnosis.law import plant_with_terms
 from workbench.diagnosis.pairs import pair_fit
 from workbench.diagnosis.refit import Refit, refit, refit_shaken
-from workbench.diagnosis.result import Diagnosis, Evidence, Ranked, told
+from workbench.diagnosis.result import Diagnosis, Evidence, Ranked, percent_told
 from workbench.diagnosis.rough import rough_fit
 from workbench.diagnosis.scan import scan
 from workbench.diagnosis.settle import settled_refit
@@ -201,7 +201,7 @@ def alike_text(names: Sequence[str]) -> str:
 
 def falls(share: float, unseen: float, evidence: Evidence) -> str:
     """How much of the misfit goes away in training and held out, in words."""
-    trained, held = f"{told(share):.0%}", f"{told(unseen):.0%}"
+    trained, held = percent_told(share), percent_told(unseen)
     return f"weighted misfit {trained} smaller in training, {held} in {evidence.value}"
 
 

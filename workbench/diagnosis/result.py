@@ -62,6 +62,12 @@ def told(share: float) -> float:
     return min(share, 1.0)
 
 
+def percent_told(share: float) -> str:
+    """A share of a misfit in words: all of it only where no tenth of a percent is left."""
+    whole = told(share)
+    return f"{whole:.1%}" if 0.99 <= whole < 0.9995 else f"{whole:.0%}"
+
+
 @dataclass(frozen=True)
 class Ranked:
     """One row of the ranking.

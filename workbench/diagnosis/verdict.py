@@ -13,7 +13,7 @@ from workbench.diagnosis.judge import (
     share_removed,
 )
 from workbench.diagnosis.power import too_weak
-from workbench.diagnosis.result import NAMING, Evidence, Law, Ranked, Verdict, told
+from workbench.diagnosis.result import NAMING, Evidence, Law, Ranked, Verdict, percent_told
 from workbench.diagnosis.scan import WIDER, Profile
 from workbench.diagnosis.warned import Of, Warned
 from workbench.effect import Kind
@@ -138,7 +138,7 @@ def refused_rivals(ranking: Sequence[Ranked], named: Ranked | None) -> tuple[War
     A few windows refuse the right one too; then what they accept instead stands for it.
     """
     rivals = [
-        f"{row.candidate.name} ({told(row.drop_train):.0%})"
+        f"{row.candidate.name} ({percent_told(row.drop_train)})"
         for row in ranking
         if named is not None and row.fit is not None and held_out_refuses(row.reasons)
         and row.drop_train >= CERTAIN_SHARE
@@ -209,7 +209,7 @@ def _said(verdict: Verdict, ranking: tuple[Ranked, ...], law: Law | None) -> str
         return _too_weak(ranking)
     if leader is None or verdict not in NAMING:
         return "nothing in the catalogue earns its place"
-    name, share = _spoken(leader), f"{told(leader.drop_train):.0%}"
+    name, share = _spoken(leader), percent_told(leader.drop_train)
     if verdict is Verdict.FOUND:
         if len(leader.candidate.singles) > 1:
             return f"{name} are missing: they remove {share} {OF_ALL}"
