@@ -229,6 +229,22 @@ def test_of_the_tied_the_one_leads_that_leaves_least_near_the_priors(
     assert group[0] is rivals[leads]
 
 
+def test_what_passes_but_for_a_size_that_nothing_tells_asks_for_another_recording(
+    problem, followed, sound
+):
+    """A band of a spool that commands jump over removed 99.9 %, and nothing was said to lack."""
+    rows = ranked(problem, followed.profiles, [unsure(sound)], [], {})
+    said = sentence(Verdict.RECORDING_TOO_WEAK, rows, None)
+
+    assert judged(rows, None, True, ("slide.position 38 times its noise",)) is (
+        Verdict.RECORDING_TOO_WEAK
+    )
+    seen = tuple(replace(row, visible_from=np.nan) for row in rows)
+    assert judged(seen, None, True, ()) is Verdict.NOTHING_MISSING
+    assert said.startswith("coulomb_friction removes 9")
+    assert said.endswith("in a size that this recording does not tell")
+
+
 @pytest.mark.parametrize(
     ("train", "held_out", "leads"),
     [(0.96, 0.95, True), (0.96, 0.80, False), (0.82, 0.95, False)],

@@ -45,6 +45,7 @@ LITTLE_LEFT = 0.05  # of a misfit: less is not compared
 LEAST_PROXY = 0.05  # of the misfit: less stands for nothing
 
 HELD_OUT_REASON = "does not predict the held-out recording better"
+SIZE_REASON = "its size is not distinct from none"
 SHARE_REASON = f"explains less than {LEAST_SHARE:.0%} of the misfit"
 
 
@@ -143,7 +144,7 @@ def _reasons_of_size(base: Fit, found: Refit | Ranked, candidate: Candidate) -> 
     if abs(size - null) < LEAST_SIZE * abs(known.typical):
         reasons.append("its size is negligible")
     elif not distinct(found.size[name], null):
-        reasons.append("its size is not distinct from none")
+        reasons.append(SIZE_REASON)
     ends = (end for end in (known.lower, known.upper) if end not in (null, absent, known.typical))
     if any(isclose(size, end, rel_tol=AT_BOUND, abs_tol=0.0) for end in ends):
         reasons.append("its size is at a bound")

@@ -30,6 +30,7 @@ from workbench.diagnosis.result import NextRecording, Ranked, Verdict
 from workbench.diagnosis.rivals import distances
 from workbench.diagnosis.showing import NOTHING, showing
 from workbench.diagnosis.ties import LARGEST_TIE
+from workbench.diagnosis.verdict import unsized
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.problem import Problem
 from workbench.manoeuvres.library import LIBRARY
@@ -54,7 +55,7 @@ def recommended(
     leader = ranking[0] if ranking else None
     if verdict not in ASKING or leader is None:
         return None
-    if verdict is Verdict.RECORDING_TOO_WEAK and not leader.accepted:
+    if verdict is Verdict.RECORDING_TOO_WEAK and not (leader.accepted or unsized(ranking)):
         progress("next recording")
         return showing(problem, ranking)
     if leader.fit is None:

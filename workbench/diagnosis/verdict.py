@@ -8,6 +8,7 @@ from workbench.diagnosis.judge import (
     CERTAIN_SHARE,
     LEAST_PROXY,
     SHARE_REASON,
+    SIZE_REASON,
     held_out_refuses,
     leaves_clearly_less,
     share_removed,
@@ -40,7 +41,8 @@ def judged(
 
     What explains next to nothing stands for nothing.  A recording that could show few effects of
     the catalogue says little by showing none, unless what hides them are errors ``far`` above the
-    noise: then something is there.
+    noise: then something is there.  It may be what removes enough of them at any size: a spool that
+    sticks within a band which the commands jump over.
     """
     if law:
         return Verdict.NOT_IN_CATALOGUE
@@ -49,11 +51,16 @@ def judged(
         if leader.crowd:
             return Verdict.RECORDING_TOO_WEAK
         return Verdict.TIE if leader.tied_with or not held_out else Verdict.FOUND
-    if too_weak(ranking) and not far:
+    if unsized(ranking) if far else too_weak(ranking):
         return Verdict.RECORDING_TOO_WEAK
     if leader and leader.reasons == (SHARE_REASON,) and share_removed(leader) > LEAST_PROXY:
         return Verdict.SMALL_PROXY
     return Verdict.NOTHING_MISSING
+
+
+def unsized(ranking: Sequence[Ranked]) -> bool:
+    """True where what leads passes but for its size, of which the recording says nothing."""
+    return bool(ranking) and ranking[0].reasons == (SIZE_REASON,)
 
 
 def too_short(base: Fit) -> bool:
@@ -235,6 +242,9 @@ def _too_weak(ranking: tuple[Ranked, ...]) -> str:
     leader = ranking[0]
     if leader.accepted:
         return f"{_spoken(leader)} and {', '.join(leader.alike)} do the same to this recording"
+    if unsized(ranking):
+        removes = f"removes {percent_told(leader.drop_train)} {OF_ALL}"
+        return f"{_spoken(leader)} {removes}, in a size that this recording does not tell"
     return _blind(ranking)
 
 
