@@ -41,6 +41,7 @@ from workbench.diagnosis.result import (
 )
 from workbench.diagnosis.scan import Profile
 from workbench.diagnosis.settle import with_settled_sizes
+from workbench.diagnosis.told_apart import told_apart
 from workbench.diagnosis.verdict import (
     far_above_noise,
     held,
@@ -224,6 +225,9 @@ def _concluded(
     if verdict in NAMING or (ranking and ranking[0].accepted):
         progress("sizes of what is named")
         ranking = with_settled_sizes(problem, ranking)
+        if law is None and not short:
+            ranking = told_apart(ranking)
+            verdict = judged(ranking, None, evidence.strong, far)
     if law:
         progress("sizes of the law")
         law = settled_law(problem, law)
