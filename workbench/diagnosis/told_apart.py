@@ -35,12 +35,15 @@ def told_apart(ranking: tuple[Ranked, ...]) -> tuple[Ranked, ...]:
     group = [row for row in ranking if row.candidate.name in names]
     if len(group) < 2 or any(row.fit is None or row.validation is None for row in group):
         return ranking
-    levels = [_levels(on_its_own_yardstick(row)) for row in group]
+    own = [on_its_own_yardstick(row) for row in group]
+    levels = [_levels(row) for row in own]
     best = min(range(len(group)), key=lambda k: sum(levels[k].values()))
     if not group[best].accepted or max(levels[best].values()) > np.log(NEAR_NOISE):
         return ranking
     stays = [k for k, each in enumerate(levels) if not _clearly_more(each, levels[best])]
-    stays.sort(key=lambda k: k != best and 0 not in stays)
+    if 0 not in stays:
+        group[best] = own[best]  # as a leader is told
+        stays.sort(key=lambda k: k != best)
     kept = [_only(group[k], {group[j].candidate.name for j in stays}) for k in stays]
     left = [_only(row, set()) for k, row in enumerate(group) if k not in stays]
     others = [row for row in ranking if row.candidate.name not in names]
