@@ -19,11 +19,14 @@ def geometry(theta, a=A, b=B, phi_0=PHI_0):
     return length, a * b * np.sin(theta + phi_0) / length
 
 
-def rates(x, u):
+def rates(x, u, payload=0.0, more_friction=0.0):
+    """With a mass at the tip in kg, and more dry friction in the cylinder in N."""
     theta, omega, *gas = x
     length, r = geometry(theta)
     y, v = length - L_MIN, r * omega
     force, gas_rates = rig.cylinder(y, v, *gas, u, stroke=STROKE)
     force += rig.stop(y, v, *(geometry(end)[0] - L_MIN for end in RANGE))
-    torque = r * force - M_L * G * L_C * np.cos(theta) - B_J * omega
-    return np.array([omega, torque / J, *gas_rates])
+    force -= more_friction * np.tanh(rig.K_TANH * v)
+    moment = M_L * L_C + payload * LENGTH
+    torque = r * force - moment * G * np.cos(theta) - B_J * omega
+    return np.array([omega, torque / (J + payload * LENGTH**2), *gas_rates])

@@ -1,7 +1,7 @@
 """What the arm and the parametric soft joint lack, on recordings of the flat oracles.
 
 The oracles are plain numpy (``oracle_crr_arm``, ``oracle_soft_joint_parametric``), run here in
-short Euler steps with sensors that quantise and are noisy; of the arm the angle is held by a loop.
+short Euler steps with noisy sensors, that of the bellows quantised; a loop holds the arm's angle.
 """
 
 from functools import partial
@@ -24,6 +24,12 @@ MS, STEP_S = 1e-3, 5e-5
 PAYLOAD_KG, MORE_FRICTION_N, LEAK = 0.3, 30.0, 0.01
 GAS_PA, NOISE_PA, NOISE_RAD = 3.7565e5, 300.0, 5e-4
 MOST_V, LEAST_V = 10.0, 0.0
+PLANTS_WITH_PAYLOAD = {
+    "servo_drive": Kind.PARAMETER,
+    "crr_rig": Kind.PARAMETER,
+    "crr_arm": Kind.EFFECT,
+    "crr_leg": Kind.EFFECT,
+}
 
 
 def train_rad(t):
@@ -33,20 +39,6 @@ def train_rad(t):
 
 def validation_rad(t):
     return np.radians(50 + 22 * np.sin(2.2 * t) * np.cos(0.7 * t) + 5 * np.sin(8 * t))
-
-
-def rates(x, u, payload_kg, more_n):
-    """Those of the oracle with a mass at the tip, and more dry friction in the cylinder."""
-    theta, omega, *gas = x
-    length, r = arm.geometry(theta)
-    y, v = length - arm.L_MIN, r * omega
-    force, gas_rates = cylinder.cylinder(y, v, *gas, u, stroke=arm.STROKE)
-    force += cylinder.stop(y, v, *(arm.geometry(end)[0] - arm.L_MIN for end in arm.RANGE))
-    force -= more_n * np.tanh(cylinder.K_TANH * v)
-    moment = arm.M_L * arm.L_C + payload_kg * arm.LENGTH
-    torque = r * force - moment * arm.G * np.cos(theta) - arm.B_J * omega
-    inertia = arm.J + payload_kg * arm.LENGTH**2
-    return np.array([omega, torque / inertia, *gas_rates])
 
 
 def arm_recording(reference, seconds, seed, payload_kg=0.0, more_n=0.0):
@@ -67,7 +59,7 @@ def arm_recording(reference, seconds, seed, payload_kg=0.0, more_n=0.0):
         sent.append(float(np.clip(wanted, LEAST_V, MOST_V)))
         late = x
         for _ in range(round(MS / STEP_S)):
-            x = x + STEP_S * rates(x, sent[-2], payload_kg, more_n)
+            x = x + STEP_S * arm.rates(x, sent[-2], payload_kg, more_n)
     noise = np.array([NOISE_RAD, NOISE_PA, NOISE_PA])
     outputs = np.array(seen) + noise * random.standard_normal((len(seen), 3))
     names = ("joint.angle_rad", "cap.pressure_pa", "rod_side.pressure_pa")
@@ -130,14 +122,6 @@ def test_a_payload_at_the_end_of_a_link_is_no_shift_of_its_mass():
 
     assert {n: c.kind for n, c in kinds.items()} == PLANTS_WITH_PAYLOAD
     assert {n for n, c in kinds.items() if c.held} == {"servo_drive", "crr_rig"}
-
-
-PLANTS_WITH_PAYLOAD = {
-    "servo_drive": Kind.PARAMETER,
-    "crr_rig": Kind.PARAMETER,
-    "crr_arm": Kind.EFFECT,
-    "crr_leg": Kind.EFFECT,
-}
 
 
 def arm_diagnosis(**hidden):

@@ -250,12 +250,10 @@ def _registry() -> Any:
 
 @lru_cache(maxsize=512)
 def _scale(unit: str, target: str, typed: str, wanted: str) -> Scale:
-    if unit == target:
+    if unit == target or (unit in NO_UNIT and not target):
         return Scale()
     if unit in {"%", "percent"} and not target:
         return Scale(divisor=100.0)
-    if unit in NO_UNIT and not target:
-        return Scale()
     if not target:
         raise UnitError(f"unit '{typed}' on a dimensionless quantity; expected a plain number")
     import pint

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
+from workbench.candidate import Candidate
 from workbench.diagnosis.judge import (
     LEAST_PROXY,
     LEAST_SHARE,
@@ -83,7 +84,7 @@ def follow(
     for each in _to_refit(begun, where):
         accepted = any(not reasons_against(problem.base, found) for found in refits)
         promising = each.share > WORTH_A_REFIT * begun[0].share
-        hopeful = each.share > LEAST_TRAINING and (not accepted or _acts_there(each, where))
+        hopeful = each.share > LEAST_TRAINING and (not accepted or _begun_there(each, where))
         if promising or hopeful or not refits:
             progress(f"refit with {each.profile.candidate.name}")
             refits.append(refit(problem, each))
@@ -109,12 +110,16 @@ def _to_refit(begun: Sequence[Rough], where: Where | None) -> list[Rough]:
 
     A constant force that a first fit leaves in a poor place is not to be lost behind four sensors.
     """
-    there = [each for each in begun if _acts_there(each, where)][:LOCATED]
+    there = [each for each in begun if _begun_there(each, where)][:LOCATED]
     return [b for k, b in enumerate(begun) if k < REFITTED or any(b is each for each in there)]
 
 
-def _acts_there(begun: Rough, where: Where | None) -> bool:
-    return where is not None and acts_in(begun.profile.candidate, where.balance)
+def _begun_there(begun: Rough, where: Where | None) -> bool:
+    return _acts_there(begun.profile.candidate, where)
+
+
+def _acts_there(candidate: Candidate, where: Where | None) -> bool:
+    return where is not None and acts_in(candidate, where.balance)
 
 
 def _shifts_to_refit(
@@ -128,8 +133,8 @@ def _shifts_to_refit(
     least = WORTH_A_SHIFT * max((each.drop_train for each in refits), default=0.0)
 
     def promising(each: Shift) -> bool:
-        there = where is not None and acts_in(each.candidate, where.balance)
-        return each.drop > least or (there and each.drop > WORTH_A_LOOK)
+        there = _acts_there(each.candidate, where) and each.drop > WORTH_A_LOOK
+        return there or each.drop > least
 
     return [each for each in moved if each.leaves and promising(each)][:SHIFTS_REFITTED]
 

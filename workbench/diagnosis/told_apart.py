@@ -19,7 +19,8 @@ import numpy as np
 from workbench.diagnosis.ranking import grouped
 from workbench.diagnosis.result import Ranked
 from workbench.diagnosis.settle import on_its_own_yardstick
-from workbench.fitting.errors import errors_of
+from workbench.fitting.errors import penalised_rmse
+from workbench.fitting.gauss_newton import Fit
 
 NEAR_NOISE = 1.5  # level of what explains a recording
 CLEARLY_MORE = 1.5  # times that level
@@ -51,11 +52,15 @@ def told_apart(ranking: tuple[Ranked, ...]) -> tuple[Ranked, ...]:
 
 
 def _levels(row: Ranked) -> dict[str, float]:
-    """Logarithm of the level of either set; what is below the noise is at it."""
-    return {
-        where: float(np.mean([np.log(max(e.rmse / e.noise, 1.0)) for e in signals.values()]))
-        for where, signals in errors_of(row.fit, row.validation).items()
-    }
+    """Logarithm of the level of either set."""
+    return {"train": _level(row.fit), "validation": _level(row.validation)}
+
+
+def _level(fit: Fit) -> float:
+    """The same of one; below the noise is at it, and what could not be simulated is penalised."""
+    recorded = np.isfinite(fit.windows.measured).any(axis=(1, 2))
+    over_noise = penalised_rmse(fit)[recorded] / fit.windows.noise[recorded]
+    return float(np.mean(np.log(np.maximum(over_noise, 1.0))))
 
 
 def _clearly_more(one: Mapping[str, float], best: Mapping[str, float]) -> bool:

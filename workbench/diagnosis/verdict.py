@@ -218,18 +218,23 @@ def _said(verdict: Verdict, ranking: tuple[Ranked, ...], law: Law | None) -> str
         return "nothing in the catalogue earns its place"
     name, share = _spoken(leader), percent_told(leader.drop_train)
     if verdict is Verdict.FOUND:
-        if len(leader.candidate.singles) > 1:
-            return f"{name} are missing: they remove {share} {OF_ALL}"
-        if leader.kind is Kind.PARAMETER:
-            moved = public_name(next(iter(leader.size)))
-            off = f"{name}: {moved} is not what the rig says"
-            return f"{off}; another value removes {share} {OF_ALL}"
-        return f"{name} is missing: it removes {share} {OF_ALL}"
+        return f"{_lack(leader)} {share} {OF_ALL}"
     if verdict is Verdict.SMALL_PROXY:
         return f"{name} explains {share} of the misfit and may stand for something else"
     if not leader.tied_with:
         return f"{name} ({share} of the misfit)"
     return f"{name} ({share} of the misfit), not to be told here from {', '.join(leader.tied_with)}"
+
+
+def _lack(row: Ranked) -> str:
+    """What is missing, or is not as the rig says, up to the share that it removes."""
+    name = _spoken(row)
+    if len(row.candidate.singles) > 1:
+        return f"{name} are missing: they remove"
+    if row.kind is Kind.PARAMETER:
+        moved = public_name(next(iter(row.size)))
+        return f"{name}: {moved} is not what the rig says; another value removes"
+    return f"{name} is missing: it removes"
 
 
 def _spoken(row: Ranked) -> str:
