@@ -31,7 +31,7 @@ from workbench.diagnosis.refit import (
 from workbench.diagnosis.result import Law, LawTerm
 from workbench.diagnosis.rough import rough_fit
 from workbench.diagnosis.scan import Profile, scan
-from workbench.fitting.problem import Problem, improved_base, misfit
+from workbench.fitting.problem import Problem, improved_base, training_drop
 from workbench.law_scales import scales
 from workbench.plant import Plant
 from workbench.recording import Recording
@@ -92,7 +92,7 @@ def _at_once(problem: Problem, terms: Sequence[Candidate], where: Where | None) 
     for count, seed in enumerate(seeds(problem.whole, where, terms, MOST_TERMS), start=1):
         found = refitted(problem, seed)
         fit, held_out = (steps[-1].fit, steps[-1].validation) if steps else before
-        drops = (fit.cost - found.fit.cost) / misfit(fit), held_out_drop(held_out, found.validation)
+        drops = training_drop(fit, found.fit), held_out_drop(held_out, found.validation)
         steps.append(LawTerm(found.candidate, found.fit, found.validation, *drops))
         gained = found.drop_train - (best.drop_train if best else 0.0)
         more = count - (len(best.steps) if best else 0)
@@ -116,7 +116,8 @@ def _term_by_term(
         least = LEAST_PROMISE * first.misfit if steps else 0.0
         chosen, terms = worth_scanning(problem, terms, () if steps else known, least)
         found = _refitted(problem, chosen, 0.0 if steps else to_beat)
-        if not found or found.drop_train * misfit(problem.base) < LEAST_TERM_SHARE * first.misfit:
+        least = LEAST_TERM_SHARE * first.base.misfit
+        if not found or found.drop_train * problem.base.misfit < least:
             break
         counted = counted_from(first.base, first.base_validation, found)
         if reasons_against(first.base, counted, parameters=len(steps) + 1):

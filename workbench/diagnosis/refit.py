@@ -16,13 +16,14 @@ from workbench.diagnosis.rough import KEPT, Rough, windows_for, with_shape
 from workbench.diagnosis.scan import Profile
 from workbench.diagnosis.shifts import Shift
 from workbench.diagnosis.size import Size, sizes
+from workbench.fitting.beyond_noise import beyond_noise, fall_beyond_noise
 from workbench.fitting.continued import continued
 from workbench.fitting.costs import best_of_each, points_costs
 from workbench.fitting.error_model import OUTLYING
 from workbench.fitting.errors import plain_chance, plain_ratio
-from workbench.fitting.gauss_newton import Fit, beyond_noise, fit_windows, leap
+from workbench.fitting.gauss_newton import Fit, fit_windows, leap
 from workbench.fitting.linearised import Point
-from workbench.fitting.problem import Problem, fitted_twice, misfit
+from workbench.fitting.problem import Problem, fitted_twice, training_drop
 from workbench.fitting.pulled_in import pulled_in
 from workbench.fitting.resized import points_of_sizes
 from workbench.fitting.shaken import shaken
@@ -170,18 +171,11 @@ def counted_from(base: Fit, held_out: Fit | None, found: Refit) -> Refit:
     """The same refit, measured against a base on the training and on the held-out windows."""
     return replace(
         found,
-        drop_train=_drop(base, found.fit),
+        drop_train=training_drop(base, found.fit),
         drop_validation=held_out_drop(held_out, found.validation),
         plain_validation=plain_ratio(held_out, found.validation),
         plain_chance=plain_chance(held_out, found.validation),
     )
-
-
-def _drop(before: Fit | None, after: Fit | None) -> float:
-    """Share of the misfit beyond noise that went away, NaN without both."""
-    if before is None or after is None:
-        return float("nan")
-    return (before.cost - after.cost) / misfit(before)
 
 
 def held_out_drop(before: Fit | None, after: Fit | None) -> float:
@@ -192,12 +186,13 @@ def held_out_drop(before: Fit | None, after: Fit | None) -> float:
     """
     if before is None or after is None:
         return float("nan")
-    return (bounded_error(before) - bounded_error(after)) / held_out_misfit(before)
+    fall = fall_beyond_noise(before.windows, _bounded_squares(before), _bounded_squares(after))
+    return fall / held_out_misfit(before)
 
 
 def held_out_misfit(fit: Fit | None) -> float:
     """Squared error beyond noise of what is held out, no window counted too much; 0 without any."""
-    return beyond_noise(bounded_error(fit), fit.windows) if fit else 0.0
+    return beyond_noise(fit.windows, _bounded_squares(fit), 0.0) if fit else 0.0
 
 
 def surplus(one: Fit, other: Fit) -> float:
@@ -223,6 +218,5 @@ def _bounded_squares(fit: Fit) -> np.ndarray:
     One is worth its recorded samples over the correlation time of their errors.
     """
     windows = fit.windows
-    squares = (fit.residual**2).sum(axis=2)
     recorded = (windows.weight > 0).sum(axis=2)
-    return np.minimum(squares, OUTLYING**2 * recorded / windows.correlation)
+    return np.minimum(fit.squares, OUTLYING**2 * recorded / windows.correlation)

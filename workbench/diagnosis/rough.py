@@ -24,7 +24,7 @@ from workbench.diagnosis.scan import Profile, Trial
 from workbench.fitting.costs import points_costs
 from workbench.fitting.gauss_newton import Fit, fit_windows, follow
 from workbench.fitting.linearised import Point, borrowed
-from workbench.fitting.problem import Problem, staged
+from workbench.fitting.problem import Problem, staged, training_drop
 from workbench.fitting.pulled_in import gone_far, towards_priors
 from workbench.fitting.start_states import carried
 from workbench.fitting.unknowns import Unknowns
@@ -74,7 +74,7 @@ def rough_fit(problem: Problem, profile: Profile, most: int = STARTS) -> Rough:
         further = _from_larger(problem, windows, unknowns, profile)
         further += _from_nearer(problem, windows, unknowns, profile)
         fit = min((fit, *further), key=lambda each: each.cost)
-    return Rough(profile, fit, (base.cost - fit.cost) / problem.misfit)
+    return Rough(profile, fit, training_drop(base, fit))
 
 
 def _from_larger(

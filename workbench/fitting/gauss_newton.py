@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from workbench.fitting.beyond_noise import beyond_noise
 from workbench.fitting.costs import (
     Cost,
     Costs,
@@ -44,7 +45,6 @@ AGAIN = 0.02  # fall, in parts of the misfit, above which derivatives are used o
 CONVERGED = 0.01  # the same, below which a fit has converged
 RESCUE_RUNS = 14  # of the plant, at most, for a step to be rescued
 CHEAP = 1.0 / 3.0  # of the runs that derivatives take: a rescue that costs less is not put off
-NOISE_KNOWN_TO = 0.05  # of its square
 WORTH_IT = 0.003  # of the misfit, for a fit to go on from there
 
 
@@ -87,6 +87,16 @@ class Fit:
         n_y, n, length = self.windows.measured.shape
         rows = self.derivatives.residual[:, : n_y * length]
         return rows.reshape(n, n_y, length).transpose(1, 0, 2)
+
+    @property
+    def squares(self) -> np.ndarray:
+        """Sum of the squared residuals of each output and window, (n_y, n_windows)."""
+        return np.sum(self.residual**2, axis=2)
+
+    @property
+    def misfit(self) -> float:
+        """Squared error beyond sensor noise, with the price of the priors, at least 1."""
+        return beyond_noise(self.windows, self.squares, self.cost - self.chi2)
 
     @property
     def unsimulated(self) -> np.ndarray:
@@ -161,7 +171,7 @@ def _advanced(
 ) -> tuple[Cost, float]:
     """Where a step leads, or where it began if that costs less; and its fall, of the misfit."""
     found = _stepped(windows, unknowns, at, now, rescue)
-    fall = (now.cost - found.cost) / beyond_noise(now.cost, windows)
+    fall = (now.cost - found.cost) / now.beyond_noise(windows)
     return min(now, found, key=lambda each: each.cost), fall
 
 
@@ -178,7 +188,7 @@ def _stepped(windows: Windows, unknowns: Unknowns, at: Linearised, now: Cost, re
         return found
     tried = Costs((*tried.rows, *_costs_after(windows, unknowns, now, damped).rows))
     found = _best(tried, unknowns, now)
-    much = now.cost - found.cost > AGAIN * beyond_noise(now.cost, windows)
+    much = now.cost - found.cost > AGAIN * now.beyond_noise(windows)
     if much or not rescue or not len(unknowns):
         return found
     return _rescued(windows, unknowns, at, now, tried)
@@ -211,18 +221,9 @@ def _rescued(windows: Windows, unknowns: Unknowns, at: Linearised, now: Cost, tr
     return tried.best
 
 
-def beyond_noise(squares: float, windows: Windows) -> float:
-    """What a sum of squared weighted residuals holds beyond sensor noise, at least 1.
-
-    Noise is measured in still pieces and known to a few percent only: what is left above it counts
-    as no less than that, or a share of next to nothing would speak for an effect.
-    """
-    return max(squares - windows.floor, NOISE_KNOWN_TO * windows.floor, 1.0)
-
-
 def worth_it(cost: float, fit: Fit) -> bool:
     """Whether a place costs so much less than a fit that fitting goes on from there."""
-    return cost < fit.cost - WORTH_IT * beyond_noise(fit.cost, fit.windows)
+    return cost < fit.cost - WORTH_IT * fit.misfit
 
 
 Step = tuple[np.ndarray, np.ndarray]  # of the scaled unknowns, and of the scaled start states

@@ -10,9 +10,10 @@ import numpy as np
 
 from workbench.candidate import Candidate
 from workbench.effect import Effect
+from workbench.fitting.beyond_noise import fall_beyond_noise, whole_beyond_noise
 from workbench.fitting.continued import continued
 from workbench.fitting.costs import points_costs
-from workbench.fitting.gauss_newton import Fit, beyond_noise, fit_windows
+from workbench.fitting.gauss_newton import Fit, fit_windows
 from workbench.fitting.linearised import Linearised, Point, plant_at
 from workbench.fitting.no_worse import no_worse_than_it_came
 from workbench.fitting.noise import measured_noise
@@ -93,17 +94,17 @@ class Problem:
 
     @property
     def misfit(self) -> float:
-        """Squared error of the base beyond sensor noise; see :func:`misfit`."""
-        return misfit(self.base)
+        """Squared error of the base beyond sensor noise, rests and motion together.
+
+        Of this the linear model promises shares; what a refit removes is counted with each alone.
+        """
+        return whole_beyond_noise(self.base.windows, self.base.cost)
 
 
-def misfit(fit: Fit) -> float:
-    """Squared error beyond what sensor noise adds, with the price of the priors, at least 1.
-
-    The price counts: a fit that reaches the same error with a heat flow five deviations off its
-    prior has explained less than one that stays near it.
-    """
-    return beyond_noise(fit.cost, fit.windows)
+def training_drop(before: Fit, after: Fit) -> float:
+    """Share of the misfit beyond noise that went away, with the price of the priors."""
+    fall = fall_beyond_noise(before.windows, before.squares, after.squares)
+    return (fall + (before.cost - before.chi2) - (after.cost - after.chi2)) / before.misfit
 
 
 def staged(whole: Plant, *members: str) -> Plant:

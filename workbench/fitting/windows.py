@@ -100,11 +100,6 @@ class Windows:
         return (self.errors.scale(self.activity, noise) / plain) ** 2
 
     @property
-    def floor(self) -> float:
-        """What sensor noise alone adds to the sum of squared weighted residuals."""
-        return float(np.sum((self.weight * self.noise[:, None, None]) ** 2))
-
-    @property
     def count(self) -> int:
         """Number of recorded values."""
         return int(np.count_nonzero(self.weight))
