@@ -1,6 +1,6 @@
 """Corners of fits and rankings: silent outputs, single windows, narrow bounds, what a rig holds."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,6 +13,7 @@ from workbench.diagnosis.rough import with_shape
 from workbench.diagnosis.scan import scan_from_priors, sizes_to_try
 from workbench.effects.forces import EndCushion
 from workbench.fitting.errors import plain_chance, plain_ratio
+from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.linearised import parameter_steps
 from workbench.fitting.problem import pose
 from workbench.fitting.unknowns import Unknowns, nominal_unknowns
@@ -27,7 +28,16 @@ DRIVE = default_rig("servo_drive")
 PRESSURE = "chamber.pressure_pa"
 
 
-def errors(size: float, windows: int = 4) -> SimpleNamespace:
+@dataclass(frozen=True)
+class Errors:
+    """What of a fit tells its errors."""
+
+    windows: SimpleNamespace
+    residual: np.ndarray
+    squares = Fit.squares
+
+
+def errors(size: float, windows: int = 4) -> Errors:
     """A fit whose residual is as large everywhere; nothing is recorded of its third output."""
     measured, residual = np.zeros((3, windows, 10)), np.full((3, windows, 10), size)
     measured[2], residual[2] = np.nan, 0.0
@@ -37,7 +47,7 @@ def errors(size: float, windows: int = 4) -> SimpleNamespace:
         weight=1.0 * np.isfinite(measured),
         correlation=np.ones((3, windows)),
     )
-    return SimpleNamespace(windows=cut, residual=residual)
+    return Errors(cut, residual)
 
 
 def test_an_output_of_which_nothing_is_recorded_has_no_say_in_the_plain_error():

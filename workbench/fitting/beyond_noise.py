@@ -4,9 +4,12 @@ Noise is measured in still pieces and known to a few percent of its square only.
 hold any number of rests, in which every sample of white noise counts, while errors of motion are
 correlated and a thousand samples of them are worth a few: of half a minute at rest these few
 percent outweigh all that a minute of motion can show.  So an output where it rests, and the same
-where it moves, are looked at each alone, and what is within a few percent of its noise holds
-nothing.  Where nothing is beyond it those few percent of all are what there is, or a share of next
-to nothing would speak for an effect.
+where it moves, are looked at each alone, and what is within that of its noise, or within its chance
+
+    sum r^2 - F <= d F + 2 sqrt(2 sum w^4),    F = sum w^2,  w = noise / scale,  d = 5 %
+
+holds nothing; of more that much is taken off.  Where nothing is beyond it all of it is what there
+is, or a share of next to nothing would speak for an effect.
 """
 
 from __future__ import annotations
@@ -17,6 +20,7 @@ from workbench.fitting.error_model import ACTIVE
 from workbench.fitting.windows import Windows
 
 NOISE_KNOWN_TO = 0.05  # of its square
+BY_CHANCE = 2.0  # deviations of a sum of squares of white noise
 
 
 def beyond_noise(windows: Windows, squares: np.ndarray, price: float) -> float:
@@ -28,9 +32,9 @@ def beyond_noise(windows: Windows, squares: np.ndarray, price: float) -> float:
     """
     excess, known_to = _excess(windows, squares)
     beyond = excess > known_to
-    if beyond.any():
-        return max(float(excess[beyond].sum()) + price, 1.0)
-    return max(float(excess.sum()) + price, float(known_to.sum()), 1.0)
+    if not beyond.any():
+        return max(float(excess.sum()) + price, float(known_to.sum()), 1.0)
+    return max(float((excess - known_to)[beyond].sum()) + price, float(known_to[beyond].sum()), 1.0)
 
 
 def whole_beyond_noise(windows: Windows, cost: float) -> float:
@@ -40,21 +44,19 @@ def whole_beyond_noise(windows: Windows, cost: float) -> float:
 
 
 def fall_beyond_noise(windows: Windows, before: np.ndarray, after: np.ndarray) -> float:
-    """How much squared errors fall where they are beyond noise, before or after.
-
-    What is within it on both sides has no say, unless all is.
-    """
+    """How much squared errors fall beyond noise; all of them where none is beyond it before."""
     (had, known_to), (left, _) = (_excess(windows, squares) for squares in (before, after))
-    beyond = had > known_to
-    counted = beyond | (left > known_to) if beyond.any() else np.ones_like(beyond)
-    return float((had - left)[counted].sum())
+    if not np.any(had > known_to):
+        return float(np.sum(had - left))
+    return float(np.sum(np.maximum(had, known_to) - np.maximum(left, known_to)))
 
 
 def _excess(windows: Windows, squares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(squares beyond noise, what noise is known to), of rests and of motion, each (2, n_y)."""
+    """(squares beyond noise, what that is known to), of rests and of motion, each (2, n_y)."""
     noise = windows.noise[:, None]
-    floors = np.sum((windows.weight * noise[:, :, None]) ** 2, axis=2)
+    weights = (windows.weight * noise[:, :, None]) ** 2
     moves = windows.activity > ACTIVE * noise
     there = np.stack([~moves, moves])
-    excess = np.sum(there * (squares - floors), axis=2)
-    return excess, NOISE_KNOWN_TO * np.sum(there * floors, axis=2)
+    floors, spread = (np.sum(there * np.sum(weights**k, axis=2), axis=2) for k in (1, 2))
+    excess = np.sum(there * squares, axis=2) - floors
+    return excess, NOISE_KNOWN_TO * floors + BY_CHANCE * np.sqrt(2.0 * spread)
