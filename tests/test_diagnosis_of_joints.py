@@ -16,6 +16,7 @@ from studies.text_of_ranking import sizes_text
 from workbench.diagnosis.diagnose import diagnose
 from workbench.diagnosis.result import Verdict
 from workbench.effect import Kind
+from workbench.effects.valve_command import PwmLag, ValveLag
 from workbench.plants import PLANTS
 from workbench.recording import Recording
 from workbench.rig import default_rig
@@ -130,6 +131,18 @@ def test_a_delay_that_leaves_the_noise_is_told_from_lags_that_leave_several_time
     assert found.verdict is Verdict.FOUND and found.ranking[0].candidate.name == "command_delay"
     (size,) = found.ranking[0].size.values()
     assert size.value == pytest.approx(0.015, rel=0.05)
+
+
+@pytest.mark.parametrize(("lag", "command_range"), [(ValveLag, 10.0), (PwmLag, 1.0)])
+def test_a_spool_begins_as_well_known_by_a_share_of_its_range(lag, command_range):
+    """A tenth of a PWM valve's range is five times its overlap: a lag stood for a hysteresis."""
+    spool = lag(name="lag", signal="u")
+    ((value, known_to),) = spool.guess({"u": np.array([0.3])}).values()
+    (state,) = spool.states()
+
+    assert value == 0.3
+    assert known_to == pytest.approx(0.01 * command_range)
+    assert state.scale == pytest.approx(0.1 * command_range)
 
 
 def test_a_payload_at_the_end_of_a_link_is_no_shift_of_its_mass():

@@ -116,8 +116,7 @@ def _term_by_term(
         least = LEAST_PROMISE * first.misfit if steps else 0.0
         chosen, terms = worth_scanning(problem, terms, () if steps else known, least)
         found = _refitted(problem, chosen, 0.0 if steps else to_beat)
-        least = LEAST_TERM_SHARE * first.base.misfit
-        if not found or found.drop_train * problem.base.misfit < least:
+        if not found or found.drop_train * problem.misfit < LEAST_TERM_SHARE * first.misfit:
             break
         counted = counted_from(first.base, first.base_validation, found)
         if reasons_against(first.base, counted, parameters=len(steps) + 1):

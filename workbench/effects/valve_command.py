@@ -78,16 +78,16 @@ class ValveLag(Effect):
     signal: str
     lagged: ClassVar[str] = "lagged_v"
     initial_v: float = 5.0
-    range_v: ClassVar[float] = 10.0
+    command_range: ClassVar[float] = 10.0
     time_constant_s: Expression = strength(typical=20e-3, upper=0.2)
     shortest_s: Expression = form(0.5e-3, lower=1e-4, upper=1e-2)
 
     def states(self) -> Iterator[State]:
-        yield State(self.lagged, initial=self.initial_v, scale=0.1 * self.range_v)
+        yield State(self.lagged, initial=self.initial_v, scale=0.1 * self.command_range)
 
     def guess(self, seen: Mapping[str, np.ndarray]) -> dict[str, tuple[np.ndarray | float, float]]:
-        known_v = 0.01 * self.range_v
-        return {self.lagged: (seen[self.signal], known_v)} if self.signal in seen else {}
+        known_to = 0.01 * self.command_range
+        return {self.lagged: (seen[self.signal], known_to)} if self.signal in seen else {}
 
     def alter(self, signal: str, value: Expression, now: Conditions) -> Expression:
         if signal != self.signal:
@@ -110,7 +110,7 @@ class PwmLag(ValveLag):
     """
 
     lagged: ClassVar[str] = "lagged_share"
-    range_v: ClassVar[float] = 1.0
+    command_range: ClassVar[float] = 1.0
     initial_v: float = 0.5
 
 

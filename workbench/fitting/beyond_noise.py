@@ -8,8 +8,10 @@ where it moves, are looked at each alone, and what is within that of its noise, 
 
     sum r^2 - F <= d F + 2 sqrt(2 sum w^4),    F = sum w^2,  w = noise / scale,  d = 5 %
 
-holds nothing; of more that much is taken off.  Where nothing is beyond it all of it is what there
-is, or a share of next to nothing would speak for an effect.
+holds nothing.  Where nothing is beyond it all of it is what there is, or a share of next to nothing
+would speak for an effect.
+
+What a step of a fit brings is measured on the whole cost, which is what it lowers.
 """
 
 from __future__ import annotations
@@ -32,23 +34,27 @@ def beyond_noise(windows: Windows, squares: np.ndarray, price: float) -> float:
     """
     excess, known_to = _excess(windows, squares)
     beyond = excess > known_to
-    if not beyond.any():
-        return max(float(excess.sum()) + price, float(known_to.sum()), 1.0)
-    return max(float((excess - known_to)[beyond].sum()) + price, float(known_to[beyond].sum()), 1.0)
-
-
-def whole_beyond_noise(windows: Windows, cost: float) -> float:
-    """The same of a whole cost, rests and motion together: what a linear model works on."""
-    floor = float(np.sum((windows.weight * windows.noise[:, None, None]) ** 2))
-    return max(cost - floor, NOISE_KNOWN_TO * floor, 1.0)
+    if beyond.any():
+        return max(float(excess[beyond].sum()) + price, 1.0)
+    return max(float(excess.sum()) + price, float(known_to.sum()), 1.0)
 
 
 def fall_beyond_noise(windows: Windows, before: np.ndarray, after: np.ndarray) -> float:
-    """How much squared errors fall beyond noise; all of them where none is beyond it before."""
+    """How much squared errors fall where they are beyond noise before, or after.
+
+    What falls below noise falls no further; all falls count where nothing is beyond it before.
+    """
     (had, known_to), (left, _) = (_excess(windows, squares) for squares in (before, after))
     if not np.any(had > known_to):
         return float(np.sum(had - left))
-    return float(np.sum(np.maximum(had, known_to) - np.maximum(left, known_to)))
+    counted = (had > known_to) | (left > known_to)
+    return float(np.sum((np.maximum(had, 0.0) - np.maximum(left, 0.0))[counted]))
+
+
+def whole_beyond_noise(windows: Windows, cost: float) -> float:
+    """A whole cost beyond noise, rests and motion together, at least 1."""
+    floor = float(np.sum((windows.weight * windows.noise[:, None, None]) ** 2))
+    return max(cost - floor, NOISE_KNOWN_TO * floor, 1.0)
 
 
 def _excess(windows: Windows, squares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

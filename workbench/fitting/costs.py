@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from workbench.fitting.beyond_noise import beyond_noise
 from workbench.fitting.linearised import Point, plant_at
 from workbench.fitting.unknowns import Unknowns
 from workbench.fitting.windows import Windows
@@ -30,10 +29,6 @@ class Cost:
     cost: float
     by_window: np.ndarray
     residual: np.ndarray
-
-    def beyond_noise(self, windows: Windows) -> float:
-        """What it holds beyond sensor noise, with priors, at least 1."""
-        return beyond_noise(windows, np.sum(self.residual**2, axis=2), self.cost - self.chi2)
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from workbench.fitting.beyond_noise import beyond_noise
+from workbench.fitting.beyond_noise import beyond_noise, whole_beyond_noise
 from workbench.fitting.costs import (
     Cost,
     Costs,
@@ -171,7 +171,7 @@ def _advanced(
 ) -> tuple[Cost, float]:
     """Where a step leads, or where it began if that costs less; and its fall, of the misfit."""
     found = _stepped(windows, unknowns, at, now, rescue)
-    fall = (now.cost - found.cost) / now.beyond_noise(windows)
+    fall = (now.cost - found.cost) / whole_beyond_noise(windows, now.cost)
     return min(now, found, key=lambda each: each.cost), fall
 
 
@@ -188,7 +188,7 @@ def _stepped(windows: Windows, unknowns: Unknowns, at: Linearised, now: Cost, re
         return found
     tried = Costs((*tried.rows, *_costs_after(windows, unknowns, now, damped).rows))
     found = _best(tried, unknowns, now)
-    much = now.cost - found.cost > AGAIN * now.beyond_noise(windows)
+    much = now.cost - found.cost > AGAIN * whole_beyond_noise(windows, now.cost)
     if much or not rescue or not len(unknowns):
         return found
     return _rescued(windows, unknowns, at, now, tried)
@@ -223,7 +223,7 @@ def _rescued(windows: Windows, unknowns: Unknowns, at: Linearised, now: Cost, tr
 
 def worth_it(cost: float, fit: Fit) -> bool:
     """Whether a place costs so much less than a fit that fitting goes on from there."""
-    return cost < fit.cost - WORTH_IT * fit.misfit
+    return cost < fit.cost - WORTH_IT * whole_beyond_noise(fit.windows, fit.cost)
 
 
 Step = tuple[np.ndarray, np.ndarray]  # of the scaled unknowns, and of the scaled start states

@@ -10,7 +10,7 @@ import numpy as np
 
 from workbench.candidate import Candidate
 from workbench.effect import Effect
-from workbench.fitting.beyond_noise import fall_beyond_noise, whole_beyond_noise
+from workbench.fitting.beyond_noise import fall_beyond_noise
 from workbench.fitting.continued import continued
 from workbench.fitting.costs import points_costs
 from workbench.fitting.gauss_newton import Fit, fit_windows
@@ -94,11 +94,8 @@ class Problem:
 
     @property
     def misfit(self) -> float:
-        """Squared error of the base beyond sensor noise, rests and motion together.
-
-        Of this the linear model promises shares; what a refit removes is counted with each alone.
-        """
-        return whole_beyond_noise(self.base.windows, self.base.cost)
+        """Squared error of the base beyond sensor noise, with the price of its priors."""
+        return self.base.misfit
 
 
 def training_drop(before: Fit, after: Fit) -> float:
