@@ -26,7 +26,7 @@ from workbench.diagnosis.rough import rough_fit
 from workbench.diagnosis.scan import scan
 from workbench.fitting.gauss_newton import fit_windows
 from workbench.fitting.linearised import Point
-from workbench.fitting.problem import BELIEVED, pose, staged
+from workbench.fitting.problem import BELIEVED, pose, staged, training_drop
 from workbench.fitting.start_states import carried
 from workbench.recording import Recording
 
@@ -112,7 +112,7 @@ def removed_share(case: Case, train: Recording) -> float:
         values = {**windows.plant.values, **nominal, candidate.strength: case.size}
         point = Point(unknowns.clipped(unknowns.scaled(values)), starts)
         fits.append(fit_windows(windows, unknowns, point, ITERATIONS))
-    share = (base.cost - min(fit.cost for fit in fits)) / problem.misfit
+    share = training_drop(base, min(fits, key=lambda each: each.cost))
     if share > LEAST_SHARE:
         return share
     (profile,) = scan(

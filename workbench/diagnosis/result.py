@@ -77,9 +77,10 @@ class Ranked:
     size
         Strength and forms by full parameter name; empty where the scan alone decided.
     drop_train, drop_validation
-        Share of the squared error beyond noise that goes away, weighed by noise and by the typical
-        errors of the model without it (:mod:`workbench.fitting.error_model`); the second is NaN
-        where the candidate was not refitted.
+        Share of the squared error beyond noise (:mod:`workbench.fitting.beyond_noise`) that goes
+        away, weighed by noise and by the typical errors of the model without it
+        (:mod:`workbench.fitting.error_model`).  Where the scan decided, what the linear model says
+        of all windows, and NaN for the second.
     tied_with
         Public names of the candidates that cannot be told apart from it here.
     imitated_by
