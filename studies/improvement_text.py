@@ -15,6 +15,7 @@ from workbench.candidate import TOGETHER
 from workbench.diagnosis.improvement import Change
 from workbench.diagnosis.judge import HELD_OUT_REASON
 from workbench.diagnosis.result import told
+from workbench.effect import Kind
 from workbench.units import public_name
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from workbench.fitting.errors import Errors
 
 CAME, REFITTED, END = (Change.START.value, "refitted", "in the end")
+SHIFTED = "another value"
 UNCHANGED = "nothing is added: the rig file is as it came; `workbench fit` refits its parameters"
 STOPPED = "stopped by the user: what was finished stays"
 USED_UP = "no round was left, and the last one added something: improve the rig file once more"
@@ -43,7 +45,7 @@ def improvement_text(found: Improvement, unit_of: Mapping[str, str]) -> str:
     """The falling error, what was added and thought over, errors and parameters."""
     head = ("with", "", "chi2 per sample, training", "validation")
     rows = [
-        (stage.label, _change(stage), number(stage.train), number(stage.validation))
+        (stage.label, _change(found, stage), number(stage.train), number(stage.validation))
         for stage in found.budget
     ]
     parts = [columns(head, rows), *_lowered(found), ""]
@@ -164,8 +166,16 @@ def free_states(found: Improvement) -> dict[str, Errors]:
     return {CAME: found.free_before, END: found.free_after}
 
 
-def _change(stage: Stage) -> str:
-    """What a step did, where its label does not say it."""
+def _change(found: Improvement, stage: Stage) -> str:
+    """What a step did, where its label does not say it; a shift adds nothing."""
+    shifts = {
+        f"+ {row.candidate.name}"
+        for each in found.diagnoses
+        for row in each.ranking
+        if row.accepted and row.kind is Kind.PARAMETER
+    }
+    if stage.change is Change.ADDED and stage.label in shifts:
+        return SHIFTED
     return "" if stage.label == stage.change.value else stage.change.value
 
 

@@ -16,6 +16,7 @@ from workbench.candidate import TOGETHER
 from workbench.diagnosis.improvement import Change, Stage
 from workbench.diagnosis.judge import HELD_OUT_REASON, SHARE_REASON
 from workbench.diagnosis.passes import Removal, Swap
+from workbench.effect import Kind
 
 
 def test_the_report_of_an_improvement_has_each_diagnosis_and_addition(improved, tmp_path):
@@ -66,6 +67,25 @@ def test_the_document_of_an_improvement_holds_its_last_diagnosis(improved):
     assert last["verdict"] == improved.diagnoses[-1].verdict.value
     assert last["sentence"] == told["diagnoses"][-1]
     assert last["contradicted"] is False
+
+
+def test_a_shift_of_what_is_there_is_told_as_another_value_and_not_as_added(improved):
+    """`+ stiction added` was told where there is less of it than the rig says."""
+    name = improved.steps[0].candidate.name
+    diagnosis = improved.diagnoses[0]
+    rows = tuple(
+        replace(row, kind=Kind.PARAMETER) if row.candidate.name == name else row
+        for row in diagnosis.ranking
+    )
+    shifted = replace(
+        improved, diagnoses=(replace(diagnosis, ranking=rows), *improved.diagnoses[1:])
+    )
+
+    def told(found):
+        return next(x for x in improvement_text(found, UNITS).splitlines() if f"+ {name} " in x)
+
+    assert "another value" in told(shifted) and "added" not in told(shifted)
+    assert "added" in told(improved)
 
 
 def budget_of(*bars):
