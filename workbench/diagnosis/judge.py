@@ -4,7 +4,8 @@ With tens of thousands of correlated samples everything is "significant", so sig
 the criterion.  A candidate is accepted when
 
 1. the effective-sample BIC falls by more than 4: scales already carry the correlation time, so
-   dBIC = dchi2 / s2 - k ln(n_eff) with s2 the misfit per effective sample of the better model,
+   dBIC = dchi2 / s2 - k ln(n_eff) with s2 the misfit per effective sample of the better model and
+   dchi2 what falls beyond noise (:mod:`workbench.fitting.beyond_noise`),
 2. a held-out recording with frozen parameters is predicted better by more than 2 %, and its plain
    squared error, in which single windows may count for much, does not grow by more than 2 %, or
    by a quarter where chance among windows explains that; where only a few slow decays are held
@@ -29,6 +30,7 @@ from workbench.diagnosis.result import Law, Ranked
 from workbench.diagnosis.size import distinct
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.own_errors import effective_by_output
+from workbench.fitting.problem import training_drop
 from workbench.fitting.window_length import moves
 
 LEAST_BIC = 4.0
@@ -117,7 +119,7 @@ def share_removed(found: Refit | Law | Ranked) -> float:
 def _bic_gain(base: Fit, fit: Fit, parameters: int) -> float:
     effective = max(effective_samples(base), 2.0)
     spread = max(fit.chi2 / effective, 1e-12)
-    return (base.cost - fit.cost) / spread - parameters * log(effective)
+    return training_drop(base, fit) * base.misfit / spread - parameters * log(effective)
 
 
 def effective_samples(fit: Fit) -> float:
