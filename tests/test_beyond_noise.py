@@ -1,19 +1,40 @@
 """What squared errors hold beyond noise: of rests and of motion, each alone."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 
+from workbench.diagnosis.judge import LEAST_BIC, _bic_gain
 from workbench.fitting.beyond_noise import beyond_noise, fall_beyond_noise, whole_beyond_noise
 from workbench.fitting.error_model import ACTIVE
-from workbench.fitting.windows import cut_windows
+from workbench.fitting.gauss_newton import Fit
+from workbench.fitting.problem import training_drop
+from workbench.fitting.windows import Windows, cut_windows
 from workbench.plants import servo_drive, soft_joint_parametric
 from workbench.recording import Recording
 
 NOISE = {"bellows.pressure_pa": 300.0}
 KNOWN, WITHIN, BEYOND = 1.0, 1.04, 2.0  # times the noise: as it is, as far as it is not known, more
 PRICE = 2.0
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """What of a fit tells its errors."""
+
+    windows: Windows
+    squares: np.ndarray
+    price: float = 0.0
+    misfit = Fit.misfit
+
+    @property
+    def chi2(self):
+        return float(self.squares.sum())
+
+    @property
+    def cost(self):
+        return self.chi2 + self.price
 
 
 @pytest.fixture(scope="module")
@@ -141,3 +162,22 @@ def test_a_whole_cost_counts_noise_to_what_it_is_known(windows):
 
     assert whole_beyond_noise(windows, 1.2 * floor) == pytest.approx(0.2 * floor)
     assert whole_beyond_noise(windows, 1.01 * floor) == pytest.approx(0.05 * floor)
+
+
+def test_the_price_of_priors_is_a_part_of_what_goes(windows, moves):
+    squares = squares_of(windows, moves, WITHIN, BEYOND)
+    before, after = (Fitted(windows, squares, price) for price in (30.0, 10.0))
+
+    assert training_drop(before, after) == pytest.approx(20.0 / before.misfit)
+    assert before.misfit == pytest.approx(excess(windows, moves, BEYOND) + 30.0)
+
+
+def test_a_fall_within_the_noise_of_rests_pays_for_no_parameter(windows, moves):
+    """Of a joint that lacked nothing a throttled supply was named for 8 of 900 in chi2 at rest."""
+    before = Fitted(windows, squares_of(windows, moves, WITHIN, BEYOND))
+    rests = Fitted(windows, squares_of(windows, moves, KNOWN, BEYOND))
+    motion = Fitted(windows, squares_of(windows, moves, WITHIN, KNOWN))
+
+    assert before.cost - rests.cost > 100.0
+    assert _bic_gain(before, rests, 1) < 0.0
+    assert _bic_gain(before, motion, 1) > LEAST_BIC
