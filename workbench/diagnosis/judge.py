@@ -30,7 +30,7 @@ from workbench.diagnosis.result import Law, Ranked
 from workbench.diagnosis.size import distinct
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.own_errors import effective_by_output
-from workbench.fitting.problem import training_drop
+from workbench.fitting.problem import training_fall
 from workbench.fitting.window_length import moves
 
 LEAST_BIC = 4.0
@@ -119,7 +119,7 @@ def share_removed(found: Refit | Law | Ranked) -> float:
 def _bic_gain(base: Fit, fit: Fit, parameters: int) -> float:
     effective = max(effective_samples(base), 2.0)
     spread = max(fit.chi2 / effective, 1e-12)
-    return training_drop(base, fit) * base.misfit / spread - parameters * log(effective)
+    return training_fall(base, fit) / spread - parameters * log(effective)
 
 
 def effective_samples(fit: Fit) -> float:

@@ -11,6 +11,7 @@ Source: diagnosis.md 1.2 and 1.4.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -93,7 +94,7 @@ class Fit:
         """Sum of the squared residuals of each output and window, (n_y, n_windows)."""
         return np.sum(self.residual**2, axis=2)
 
-    @property
+    @cached_property
     def misfit(self) -> float:
         """Squared error beyond sensor noise, with the price of the priors, at least 1."""
         return beyond_noise(self.windows, self.squares, self.cost - self.chi2)

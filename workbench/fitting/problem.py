@@ -98,10 +98,15 @@ class Problem:
         return self.base.misfit
 
 
-def training_drop(before: Fit, after: Fit) -> float:
-    """Share of the misfit beyond noise that went away, with the price of the priors."""
+def training_fall(before: Fit, after: Fit) -> float:
+    """How much of the misfit beyond noise went away, with the price of the priors."""
     fall = fall_beyond_noise(before.windows, before.squares, after.squares)
-    return (fall + (before.cost - before.chi2) - (after.cost - after.chi2)) / before.misfit
+    return fall + (before.cost - before.chi2) - (after.cost - after.chi2)
+
+
+def training_drop(before: Fit, after: Fit) -> float:
+    """The same as a share of what there was."""
+    return training_fall(before, after) / before.misfit
 
 
 def staged(whole: Plant, *members: str) -> Plant:
