@@ -76,3 +76,13 @@ def test_of_two_fits_below_that_noise_the_one_without_slow_errors_is_better(fit)
 
     assert better_of(wavy, fit) is fit
     assert better_of(fit, wavy) is fit
+
+
+def test_only_noise_is_better_than_slow_errors_whatever_its_priors_cost(fit):
+    wavy, dear = with_wave(fit, 0.45), with_wave(fit, 0.0)
+    dear.cost += 1e5
+
+    assert only_noise(dear) and not only_noise(wavy)
+    assert better_of(wavy, dear) is dear
+    assert better_of(dear, wavy) is dear
+    assert better_of(dear, fit) is fit

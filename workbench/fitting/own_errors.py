@@ -9,7 +9,8 @@ weights from what it leaves itself, and two fits, each with its own weights, are
 with e_k the error of output k over all windows, n_k its samples over the time for which errors are
 correlated, and noise_k its noise, or less where the errors of one of the fits are white at a lower
 level: twice the negative logarithm of the posterior where the variance of each output's errors is
-what it leaves.
+what it leaves.  A fit that leaves only noise is better than one that does not, whatever its priors
+cost: where errors are correlated few samples count, too few to tell what white ones are worth.
 
 Source: the concentrated likelihood, Seber and Wild 1989, "Nonlinear regression", section 2.2.
 """
@@ -70,6 +71,8 @@ def by_own_errors(fit: Fit) -> Fit:
 
 def better_of(fit: Fit, tried: Fit) -> Fit:
     """Of two fits of the same windows the one with the larger posterior; see the module."""
+    if only_noise(fit) != only_noise(tried):
+        return tried if only_noise(tried) else fit
     samples = effective_by_output(fit.windows)
     noise = np.fmin(fit.windows.noise, np.fmin(white_level(fit), white_level(tried)))
 
