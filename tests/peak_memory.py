@@ -1,12 +1,9 @@
 """Most memory that a process held, told by itself."""
 
-import os
 import resource
-import sys
 from pathlib import Path
 
 STATUS = Path("/proc/self/status")
-AS_HERE = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}  # for a child that imports alike
 
 
 def peak_mib() -> float:

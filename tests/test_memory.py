@@ -7,7 +7,7 @@ import subprocess
 import sys
 
 import pytest
-from peak_memory import AS_HERE
+from child_process import imports_alike
 
 MOST_MIB = 1e9 / 2**20
 COMMANDS = {
@@ -29,8 +29,13 @@ print(peak_mib(), np.ptp(found["{moves}"]))
 
 
 def run(*arguments):
-    command = [sys.executable, *arguments]
-    return subprocess.run(command, capture_output=True, text=True, check=False, env=AS_HERE)
+    return subprocess.run(
+        [sys.executable, *arguments],
+        capture_output=True,
+        text=True,
+        check=False,
+        env=imports_alike(),
+    )
 
 
 @pytest.mark.slow

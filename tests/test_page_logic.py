@@ -1,6 +1,5 @@
 """What the page does, without a browser: sessions, replay, thinning, jobs."""
 
-import os
 import subprocess
 import sys
 import time
@@ -9,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from child_process import imports_alike
 from hypothesis import given
 from hypothesis import strategies as st
 from page_files import drive_files
@@ -134,7 +134,7 @@ def test_the_replay_script_gives_the_rig_that_was_saved(session, folder):
 
     ran = subprocess.run(
         [sys.executable, "replay.py"], cwd=folder, capture_output=True, text=True,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+        env=imports_alike(),
     )  # fmt: skip
 
     assert ran.returncode == 0, ran.stderr

@@ -4,7 +4,8 @@ import subprocess
 import sys
 
 import numpy as np
-from peak_memory import AS_HERE, peak_mib
+from child_process import imports_alike
+from peak_memory import peak_mib
 
 CODE = "import peak_memory; print(peak_memory.peak_mib())"
 TAKES = "import numpy, peak_memory; numpy.ones(25 * 2**20); print(peak_memory.peak_mib())"
@@ -12,7 +13,11 @@ TAKES = "import numpy, peak_memory; numpy.ones(25 * 2**20); print(peak_memory.pe
 
 def told(code):
     done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=AS_HERE
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        check=True,
+        env=imports_alike(),
     )
     return float(done.stdout)
 

@@ -11,6 +11,7 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
+from child_process import imports_alike
 from commands import call
 
 from studies.kept import Kept
@@ -81,7 +82,7 @@ if __name__ == "__main__":
 def test_a_kill_loses_what_is_running_and_no_more(tmp_path):
     script, path = tmp_path / "slow.py", tmp_path / "rows"
     script.write_text(SLOW_WORK, encoding="utf-8")
-    around = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    around = imports_alike()
     command = [sys.executable, str(script), str(path)]
     begun = subprocess.Popen(command, env=around, start_new_session=True)
     try:
@@ -119,7 +120,7 @@ def test_nobody_at_the_address_is_said():
 def cluster(folder, workers=2):
     """The address of a scheduler on loopback with workers, as somebody would start them."""
     quiet = dict(stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=folder)
-    around = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    around = imports_alike()
     file = folder / "scheduler.json"
     local = ["--host", "127.0.0.1", "--no-dashboard"]
     dask = [sys.executable, "-m", "dask"]

@@ -19,7 +19,8 @@ import time
 
 import numpy as np
 import pytest
-from peak_memory import AS_HERE, peak_mib
+from child_process import imports_alike
+from peak_memory import peak_mib
 from scipy.optimize import least_squares
 
 from studies.demo import DATA, MOST_WINDOWS
@@ -85,7 +86,7 @@ def asked(found):
 @pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_diagnosis_of_twelve_seconds_stays_within_a_gigabyte(engine):
-    around = {**AS_HERE, "WORKBENCH_NO_COMPILER": ENGINES[engine]}
+    around = {**imports_alike(), "WORKBENCH_NO_COMPILER": ENGINES[engine]}
     answer = subprocess.run(
         [sys.executable, __file__], env=around, capture_output=True, text=True, check=True
     )

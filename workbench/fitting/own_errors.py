@@ -71,8 +71,8 @@ def by_own_errors(fit: Fit) -> Fit:
 
 def better_of(fit: Fit, tried: Fit) -> Fit:
     """Of two fits of the same windows the one with the larger posterior; see the module."""
-    if only_noise(fit) != only_noise(tried):
-        return tried if only_noise(tried) else fit
+    if (comes_to_noise := only_noise(tried)) != only_noise(fit):
+        return tried if comes_to_noise else fit
     samples = effective_by_output(fit.windows)
     noise = np.fmin(fit.windows.noise, np.fmin(white_level(fit), white_level(tried)))
 
