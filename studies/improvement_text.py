@@ -15,7 +15,6 @@ from workbench.candidate import TOGETHER
 from workbench.diagnosis.improvement import Change
 from workbench.diagnosis.judge import HELD_OUT_REASON
 from workbench.diagnosis.result import told
-from workbench.effect import Kind
 from workbench.units import public_name
 
 if TYPE_CHECKING:
@@ -24,8 +23,8 @@ if TYPE_CHECKING:
     from workbench.diagnosis.result import Diagnosis
     from workbench.fitting.errors import Errors
 
+BROUGHT_IN = (Change.ADDED, Change.SHIFTED)
 CAME, REFITTED, END = (Change.START.value, "refitted", "in the end")
-SHIFTED = "another value"
 UNCHANGED = "nothing is added: the rig file is as it came; `workbench fit` refits its parameters"
 STOPPED = "stopped by the user: what was finished stays"
 USED_UP = "no round was left, and the last one added something: improve the rig file once more"
@@ -45,7 +44,7 @@ def improvement_text(found: Improvement, unit_of: Mapping[str, str]) -> str:
     """The falling error, what was added and thought over, errors and parameters."""
     head = ("with", "", "chi2 per sample, training", "validation")
     rows = [
-        (stage.label, _change(found, stage), number(stage.train), number(stage.validation))
+        (stage.label, _change(stage), number(stage.train), number(stage.validation))
         for stage in found.budget
     ]
     parts = [columns(head, rows), *_lowered(found), ""]
@@ -138,14 +137,14 @@ def _claimed(stage: Stage) -> str:
 
     The terms of a law tell what all of them together remove.
     """
-    if stage.change is Change.ADDED:
+    if stage.change in BROUGHT_IN:
         return f"+ {stage.label.removeprefix('+ ').split(TOGETHER)[0]}"
     return "" if stage.change is Change.LAW else stage.label
 
 
 def _lowered(found: Improvement) -> list[str]:
     """Whose fit a row of the budget may be."""
-    return [LOWERED] if any(stage.change is Change.ADDED for stage in found.budget) else []
+    return [LOWERED] if any(stage.change in BROUGHT_IN for stage in found.budget) else []
 
 
 def _taken_instead(found: Diagnosis) -> str:
@@ -166,16 +165,8 @@ def free_states(found: Improvement) -> dict[str, Errors]:
     return {CAME: found.free_before, END: found.free_after}
 
 
-def _change(found: Improvement, stage: Stage) -> str:
-    """What a step did, where its label does not say it; a shift adds nothing."""
-    shifts = {
-        f"+ {row.candidate.name}"
-        for each in found.diagnoses
-        for row in each.ranking
-        if row.accepted and row.kind is Kind.PARAMETER
-    }
-    if stage.change is Change.ADDED and stage.label in shifts:
-        return SHIFTED
+def _change(stage: Stage) -> str:
+    """What a step did, where its label does not say it."""
     return "" if stage.label == stage.change.value else stage.change.value
 
 

@@ -12,8 +12,10 @@ from studies.hidden_cases import removed_share
 from studies.text_of_results import moved_text, strained_text
 from workbench.diagnosis.addition import accept, assembled
 from workbench.diagnosis.diagnose import diagnose
+from workbench.diagnosis.improvement import Change
 from workbench.diagnosis.refit import refit_shift
 from workbench.diagnosis.result import Kind, Verdict
+from workbench.diagnosis.rounds import Rounds
 from workbench.diagnosis.scan import scan_catalogue
 from workbench.diagnosis.shifts import shifts
 from workbench.diagnosis.verdict import held
@@ -150,6 +152,14 @@ def test_a_shift_that_was_accepted_may_go_as_far_as_before_in_the_next_round(fou
     assert unknowns.prior[row] == pytest.approx(TRUE_N, rel=0.05)
     assert unknowns.scale[row] == pytest.approx(DEVIATION_N)
     assert unknowns.ends[1][row] == pytest.approx(BELIEVED, rel=0.01)
+
+
+def test_a_shift_that_was_accepted_is_another_value_in_the_budget_and_not_added(found):
+    """The JSON of an improvement said of a friction that was there that it was added."""
+    done = Rounds(RIG).told(found).added(accept(RIG, found), found)
+
+    assert done.budget[-1].label == "+ coulomb_friction"
+    assert done.budget[-1].change is Change.SHIFTED
 
 
 def test_a_hidden_effect_is_seen_where_a_diagnosis_sees_it(found, monkeypatch):

@@ -16,7 +16,6 @@ from workbench.candidate import TOGETHER
 from workbench.diagnosis.improvement import Change, Stage
 from workbench.diagnosis.judge import HELD_OUT_REASON, SHARE_REASON
 from workbench.diagnosis.passes import Removal, Swap
-from workbench.effect import Kind
 
 
 def test_the_report_of_an_improvement_has_each_diagnosis_and_addition(improved, tmp_path):
@@ -71,21 +70,22 @@ def test_the_document_of_an_improvement_holds_its_last_diagnosis(improved):
 
 def test_a_shift_of_what_is_there_is_told_as_another_value_and_not_as_added(improved):
     """`+ stiction added` was told where there is less of it than the rig says."""
-    name = improved.steps[0].candidate.name
-    diagnosis = improved.diagnoses[0]
-    rows = tuple(
-        replace(row, kind=Kind.PARAMETER) if row.candidate.name == name else row
-        for row in diagnosis.ranking
-    )
+    label = f"+ {improved.steps[0].candidate.name}"
     shifted = replace(
-        improved, diagnoses=(replace(diagnosis, ranking=rows), *improved.diagnoses[1:])
+        improved,
+        budget=tuple(
+            bar._replace(change=Change.SHIFTED) if bar.label == label else bar
+            for bar in improved.budget
+        ),
     )
 
     def told(found):
-        return next(x for x in improvement_text(found, UNITS).splitlines() if f"+ {name} " in x)
+        return next(x for x in improvement_text(found, UNITS).splitlines() if f"{label} " in x)
 
     assert "another value" in told(shifted) and "added" not in told(shifted)
     assert "added" in told(improved)
+    changes = [bar["change"] for bar in improvement_document(shifted, UNITS)["budget"]]
+    assert changes[2] == "another value" and "added" in changes
 
 
 def budget_of(*bars):

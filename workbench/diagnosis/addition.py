@@ -19,6 +19,7 @@ from workbench.diagnosis.result import Diagnosis, Evidence, Ranked, percent_told
 from workbench.diagnosis.rough import rough_fit
 from workbench.diagnosis.scan import scan
 from workbench.diagnosis.settle import settled_refit
+from workbench.effect import Kind
 from workbench.fitting.errors import Errors, errors_of, require_simulated
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.posterior import (
@@ -45,7 +46,8 @@ class Addition:
 
     ``evidence`` says what its errors on held-out recordings are worth, ``against`` which criteria
     of acceptance it fails: whoever adds an effect by name may know more than the recordings.
-    ``alike`` is what its diagnosis did not tell it from.
+    ``alike`` is what its diagnosis did not tell it from, ``kind`` whether it only shifts what was
+    there.
     """
 
     rig: Rig
@@ -60,6 +62,7 @@ class Addition:
     evidence: Evidence = Evidence.VALIDATION
     against: tuple[str, ...] = ()
     alike: tuple[str, ...] = ()
+    kind: Kind = Kind.EFFECT
 
 
 def add(
@@ -188,7 +191,7 @@ def addition_of(rig: Rig, diagnosis: Diagnosis, row: Ranked) -> Addition:
         diagnosis.evidence,
     )
     note = f"{step.rig.notes[-1]}{alike_text(row.alike)}"
-    return replace(noted(step, note), alike=row.alike)
+    return replace(noted(step, note), alike=row.alike, kind=row.kind)
 
 
 def alike_text(names: Sequence[str]) -> str:

@@ -25,6 +25,7 @@ class Change(Enum):
     START = "as it came"
     REFITTED = "parameters refitted"
     ADDED = "added"
+    SHIFTED = "another value"
     DROPPED = "dropped"
     SWAPPED = "swapped"
     LAW = "empirical"

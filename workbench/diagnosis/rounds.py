@@ -136,8 +136,8 @@ class Rounds:
         names = (half.candidate.name for half in halves)
         known = {**self.origins, **dict(zip(names, origins, strict=True))}
         done = replace(self, steps=steps, kept=kept, origins=known)
-        label = f"+ {step.candidate.name}"
-        return done.marked(label, step.fit, step.validation_fit, Change.ADDED)
+        change = Change.SHIFTED if step.kind is Kind.PARAMETER else Change.ADDED
+        return done.marked(f"+ {step.candidate.name}", step.fit, step.validation_fit, change)
 
 
 @dataclass(frozen=True)
