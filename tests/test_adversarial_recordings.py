@@ -231,6 +231,7 @@ JOINT = {
     "by 10": (spoil.scaled(0.1, "bellows.pressure_pa"), "bellows.pressure looks ten times"),
     "times 10": (spoil.scaled(10.0, "bellows.pressure_pa"), "bellows.pressure looks ten times"),
     "mirrored": (spoil.turned("valve.pwm", 0.5), "valve.pwm seems to act the other way"),
+    "percent": (spoil.scaled(0.01, "valve.pwm"), "valve.pwm looks 100 times (a fraction for %)"),
     "gauge": (spoil.shifted(-1.013e5, "bellows.pressure_pa"), "looks one atmosphere too small"),
     "noise": (spoil.noise("bellows.pressure_pa"), "bellows.pressure is noise"),
 }

@@ -39,6 +39,7 @@ FACTORS = {
     "m_s": {10.0: TEN, 1e3: f"{THOUSAND} (m/s for mm/s)"},
     "rad": {10.0: TEN, 57.296: "57.3 times (rad for deg)"},
     "n": {10.0: TEN, 1e3: f"{THOUSAND} (kN for N)"},
+    "": {10.0: TEN, 100.0: "100 times (a fraction for %)", 1e3: THOUSAND},
 }
 ANY = {10.0: TEN, 1e3: THOUSAND}
 TURNED = ("position_m", "angle_rad", "velocity_m_s", "force_n")
