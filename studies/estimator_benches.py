@@ -13,7 +13,7 @@ from estimators.augmentation import AugmentedPlant, Unknown, augmented
 from estimators.scheduled_kalman import noise_for
 from estimators.tuning import tuned_noise
 from studies.estimator_truths import TrueRun
-from workbench.effects.empirical import ConstantFlow
+from workbench.effects.empirical_fillings import ConstantFlow
 from workbench.plant import Plant
 from workbench.plants.gearbox import gearbox
 from workbench.plants.servo_drive import OUTPUTS, servo_drive

@@ -6,13 +6,14 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from studies.plain import plain
-from studies.text import number, removed, shown
+from studies.text import removed, shown
 from workbench.diagnosis.result import Law, told
-from workbench.effects.empirical import EmpiricalFlow, EmpiricalForce, ScaledFlow
+from workbench.effects.empirical import EmpiricalForce
+from workbench.effects.empirical_fillings import EmpiricalFilling, ScaledFilling
 from workbench.rig_laws import laws_of
-from workbench.units import display_unit, public_name, si_unit
+from workbench.units import public_name, si_unit
 
-Term = EmpiricalForce | EmpiricalFlow
+Term = EmpiricalForce | EmpiricalFilling
 HOW = "`workbench add RIG law --fit ...` takes it, `improve --law` does where nothing else helps"
 
 
@@ -88,9 +89,9 @@ def _formula(term: Term, sizes: Mapping[str, float]) -> str:
     elif "middle_m" in counted:
         said.append(f"mid = {counted['middle_m']}")
     if "pressure_pa" in counted:
-        what = "p above ambient" if isinstance(term, ScaledFlow) else "dp"
+        what = "p above ambient" if isinstance(term, ScaledFilling) else "dp"
         said.append(f"{what} in {counted['pressure_pa']}")
-    if isinstance(term, ScaledFlow) and term.command:
-        unit = display_unit(term.command)
-        said.append(f"u from {number(term.rest, 4)} {unit} in {number(term.span, 4)} {unit}")
+    if isinstance(term, ScaledFilling) and term.command:
+        rest, span = (shown(value, term.command, 4) for value in (term.rest, term.span))
+        said.append(f"u from {rest} in {span}")
     return ", ".join(said)

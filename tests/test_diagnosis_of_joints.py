@@ -12,6 +12,7 @@ import oracle_crr_rig as cylinder
 import oracle_soft_joint_parametric as bellows
 import pytest
 
+from studies.text_of_law import law_text
 from studies.text_of_ranking import sizes_text
 from workbench.diagnosis.diagnose import diagnose
 from workbench.diagnosis.result import Verdict
@@ -22,7 +23,7 @@ from workbench.recording import Recording
 from workbench.rig import default_rig
 
 MS, STEP_S = 1e-3, 5e-5
-PAYLOAD_KG, MORE_FRICTION_N, LEAK = 0.3, 30.0, 0.01
+PAYLOAD_KG, MORE_FRICTION_N, LEAK, BESIDE_PA_S = 0.3, 30.0, 0.01, 1e5
 GAS_PA, NOISE_PA, NOISE_RAD = 3.7565e5, 300.0, 5e-4
 MOST_V, LEAST_V = 10.0, 0.0
 PLANTS_WITH_PAYLOAD = {
@@ -72,7 +73,7 @@ def volumes_at(theta):
     return cylinder.volumes(arm.geometry(theta)[0] - arm.L_MIN, arm.STROKE)
 
 
-def bellows_recording(seed, leak_share=0.0, spool_share=0.0, delay_ms=0, rest_s=0.0):
+def bellows_recording(seed, leak_share=0.0, spool_share=0.0, delay_ms=0, rest_s=0.0, beside=None):
     """Random levels and rests at the centre, of 50 to 500 ms each; then at rest, vented."""
     random, pressure, seen, sent = np.random.default_rng(seed), bellows.P_ATM, [], []
     while len(sent) < 8000:
@@ -85,6 +86,7 @@ def bellows_recording(seed, leak_share=0.0, spool_share=0.0, delay_ms=0, rest_s=
             rate = bellows.rate(pressure, bellows.area_map(c), bellows.TAU_AREA)
             out, fill = pressure - bellows.P_ATM, bellows.P_SRC - pressure
             rate += (spool_share * (fill - out) - leak_share * out) / bellows.TAU_AREA
+            rate += beside(c, out) if beside else 0.0
             pressure += 0.25 * MS * rate
     values = np.array(seen) + NOISE_PA * random.standard_normal(len(seen))
     rounded = 50.0 * np.round(values / 50.0)
@@ -119,6 +121,28 @@ def test_long_rests_do_not_hide_what_the_motion_shows():
     assert leader.candidate.name == "chamber_leak"
     assert min(leader.drop_train, leader.drop_validation) > 0.95
     assert max(e.rmse / e.noise for e in found.after["validation"].values()) < 1.1
+
+
+@pytest.mark.parametrize(
+    ("beside", "term", "size_pa_s"),
+    [
+        (lambda c, out: BESIDE_PA_S, "constant", lambda most_pa: BESIDE_PA_S),
+        (lambda c, out: -0.5 * abs(2.0 * c - 1.0) * out, "|u| p", lambda most_pa: -0.5 * most_pa),
+    ],
+)
+def test_what_no_effect_does_to_a_pressure_without_gas_is_a_law_of_its_rate(
+    beside, term, size_pa_s
+):
+    """A flow controller beside the valve, or a vent that opens with it; only gas had laws."""
+    made = [bellows_recording(seed, beside=beside) for seed in (1, 2)]
+    found = diagnose(default_rig("soft_joint_parametric"), made[:1], made[1:])
+    most_pa = made[0]["bellows.pressure_pa"].max()
+
+    assert found.verdict is Verdict.NOT_IN_CATALOGUE
+    assert found.law.balances == ("bellows.mass",)
+    (size,) = found.law.terms.values()
+    assert size.value == pytest.approx(size_pa_s(most_pa), rel=0.05)
+    assert f"law[{term}]@bellows: dp/dt = a" in law_text(found.law)
 
 
 @pytest.mark.parametrize("seeds", [(1, 2), (1, 2, 3)])

@@ -6,7 +6,8 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from workbench.effects.empirical import EmpiricalFlow, EmpiricalForce, ScaledForce
+from workbench.effects.empirical import EmpiricalForce, ScaledForce
+from workbench.effects.empirical_fillings import EmpiricalFilling
 from workbench.fitting.starts import bridged, slope
 from workbench.recording import Recording
 
@@ -26,14 +27,14 @@ def recorded_speed(recording: Recording, body: str) -> np.ndarray | None:
 
 
 def scales(
-    laws: Iterable[EmpiricalForce | EmpiricalFlow], recordings: Sequence[Recording]
+    laws: Iterable[EmpiricalForce | EmpiricalFilling], recordings: Sequence[Recording]
 ) -> dict[str, float]:
     """Full names and values in SI of the sizes of the terms that these recordings show."""
     found: dict[str, float] = {}
     shown: dict[tuple[str, ...], dict[str, float]] = {}
     for law in laws:
         pressing = law.chambers if isinstance(law, ScaledForce) else ()
-        pressing = (law.chamber,) if isinstance(law, EmpiricalFlow) else pressing
+        pressing = (law.chamber,) if isinstance(law, EmpiricalFilling) else pressing
         key = (getattr(law, "body", None) or "", *pressing)
         if key not in shown:
             shown[key] = _moved(key[0], recordings) | _pressed(pressing, recordings)

@@ -12,15 +12,14 @@ from math import inf
 from typing import Any
 
 from workbench.effect import Effect
-from workbench.effects.empirical import (
-    FORCES,
+from workbench.effects.empirical import FORCES, EmpiricalForce, ScaledDrag, ScaledForce
+from workbench.effects.empirical_fillings import (
     ConstantFlow,
-    EmpiricalFlow,
-    EmpiricalForce,
+    ConstantRate,
+    EmpiricalFilling,
     PressureFlow,
-    ScaledDrag,
     ScaledFlow,
-    ScaledForce,
+    ScaledRate,
     SpeedFlow,
 )
 from workbench.effects.law_features import (
@@ -40,6 +39,7 @@ from workbench.plant import Plant
 from workbench.rig_text import RigText, quoted
 from workbench.simulation import arriving_at_rest
 from workbench.units import UnitError, public_name, quantity, written
+from workbench.vessel import LumpedPressure
 
 PREFIX = "law["
 Ranges = Mapping[str, tuple[float, float]]
@@ -50,9 +50,9 @@ def is_law(name: str) -> bool:
     return name.startswith(PREFIX)
 
 
-def laws_of(plant: Plant) -> tuple[EmpiricalForce | EmpiricalFlow, ...]:
+def laws_of(plant: Plant) -> tuple[EmpiricalForce | EmpiricalFilling, ...]:
     """The empirical terms that stand in a plant."""
-    return tuple(e for e in plant.effects if isinstance(e, EmpiricalForce | EmpiricalFlow))
+    return tuple(e for e in plant.effects if isinstance(e, EmpiricalForce | EmpiricalFilling))
 
 
 def law_terms(plant: Plant) -> dict[str, Effect]:
@@ -66,6 +66,8 @@ def _terms(plant: Plant) -> Iterator[Effect]:
             yield from _forces(plant, part.name)
         elif isinstance(part, GasVolume):
             yield from _flows(plant, part)
+        elif isinstance(part, LumpedPressure):
+            yield from _rates(plant, part)
 
 
 def _forces(plant: Plant, body: str) -> Iterator[Effect]:
@@ -97,12 +99,26 @@ def _flows(plant: Plant, part: GasVolume) -> Iterator[Effect]:
         yield SpeedFlow(name=_named(SpeedFlow, part.name), **at, body=body)
     for outside in _outside(plant):
         moved = [(MOVED_FLOWS, {"body": body})] if body else []
-        single = len(plant.commands) == 1
-        commanded = [(COMMANDED_FLOWS, _command(plant))] if single else []
-        for features, more in ((GAUGE_FLOWS, {}), *moved, *commanded):
+        for features, more in ((GAUGE_FLOWS, {}), *moved, *_commanded(plant)):
             for feature in features:
                 name = _written(feature, part.name)
                 yield ScaledFlow(name=name, feature=feature, outside=outside, **at, **more)
+
+
+def _rates(plant: Plant, part: LumpedPressure) -> Iterator[Effect]:
+    """As those into a volume of gas, of a pressure that knows no gas and closes with no body."""
+    at = {"chamber": part.name}
+    yield ConstantRate(name=_named(ConstantRate, part.name), **at)
+    for outside in _outside(plant):
+        for features, more in ((GAUGE_FLOWS, {}), *_commanded(plant)):
+            for feature in features:
+                name = _written(feature, part.name)
+                yield ScaledRate(name=name, feature=feature, outside=outside, **at, **more)
+
+
+def _commanded(plant: Plant) -> list[tuple[tuple[Feature, ...], dict[str, Any]]]:
+    """What goes by the command; nothing where there are several."""
+    return [(COMMANDED_FLOWS, _command(plant))] if len(plant.commands) == 1 else []
 
 
 def _outside(plant: Plant) -> list[str]:

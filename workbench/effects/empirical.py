@@ -2,7 +2,8 @@
 
 They are not physical effects and stand in no catalogue.  Each is one simple function of one or two
 driving variables in one balance, with one coefficient, and a law is a sum of at most three.  A rig
-file takes them like effects: ``add = ["law[v|v|]@slide"]``.
+file takes them like effects: ``add = ["law[v|v|]@slide"]``.  Here are those of a body; what fills a
+chamber stands in :mod:`workbench.effects.empirical_fillings`.
 """
 
 from __future__ import annotations
@@ -19,7 +20,6 @@ from workbench.effect import (
     Effect,
     Expression,
     Force,
-    MassFlow,
     form,
     strength,
 )
@@ -37,7 +37,8 @@ CONSTANT = "constant"  # the driver of what nothing drives
 ROUND_M, ROUND_M_S = 1e-6, 1e-6  # where |x| and |v| turn smoothly
 
 
-def _cause(driver: str, coefficient: str, balance: Balance) -> tuple[Cause, ...]:
+def cause_of(driver: str, coefficient: str, balance: Balance) -> tuple[Cause, ...]:
+    """The one cause that a term is, by what drives it."""
     cause = Cause(
         name=f"law[{driver}]",
         strength=coefficient,
@@ -77,7 +78,7 @@ class EmpiricalForce(Effect):
 class SquareDrag(EmpiricalForce):
     """F = -a v |v|."""
 
-    causes = _cause("v|v|", "quadratic_n_s2_m2", Balance.MOMENTUM)
+    causes = cause_of("v|v|", "quadratic_n_s2_m2", Balance.MOMENTUM)
     formula = "F = -a v |v|"
     quadratic_n_s2_m2: Expression = strength(typical=300.0, lower=-30.0, upper=1e5)
 
@@ -89,7 +90,7 @@ class SquareDrag(EmpiricalForce):
 class CubicDrag(EmpiricalForce):
     """F = -a v^3."""
 
-    causes = _cause("v^3", "cubic_n_s3_m3", Balance.MOMENTUM)
+    causes = cause_of("v^3", "cubic_n_s3_m3", Balance.MOMENTUM)
     formula = "F = -a v^3"
     cubic_n_s3_m3: Expression = strength(typical=500.0, lower=-15.0, upper=1e5)
 
@@ -101,7 +102,7 @@ class CubicDrag(EmpiricalForce):
 class PlacedDrag(EmpiricalForce):
     """F = -a v |x - x_m|, with x_m the middle of the recorded stroke."""
 
-    causes = _cause("v|x - mid|", "placed_viscous_n_s_m2", Balance.MOMENTUM)
+    causes = cause_of("v|x - mid|", "placed_viscous_n_s_m2", Balance.MOMENTUM)
     formula = "F = -a v |x - mid|"
     counted_in = ("middle_m",)
     placed_viscous_n_s_m2: Expression = strength(typical=500.0, lower=-1e5, upper=1e5)
@@ -116,7 +117,7 @@ class PlacedDrag(EmpiricalForce):
 class CurvedForce(EmpiricalForce):
     """F = a (x - x_m)^2, with x_m the middle of the recorded stroke."""
 
-    causes = _cause("(x - mid)^2", "curved_n_m2", Balance.MOMENTUM)
+    causes = cause_of("(x - mid)^2", "curved_n_m2", Balance.MOMENTUM)
     formula = "F = a (x - mid)^2"
     counted_in = ("middle_m",)
     curved_n_m2: Expression = strength(typical=2000.0, lower=-1e6, upper=1e6)
@@ -126,65 +127,7 @@ class CurvedForce(EmpiricalForce):
         return self.curved_n_m2 * (position_m - self.middle_m) ** 2
 
 
-@dataclass(frozen=True, kw_only=True)
-class EmpiricalFlow(Effect):
-    """A plain flow into a chamber in kg/s, with the temperature of the chamber.
-
-    Source: diagnosis.md 1.9.
-    """
-
-    formula: ClassVar[str] = ""
-    counted_in: ClassVar[tuple[str, ...]] = ()
-
-    chamber: str
-
-    def flow_kg_s(self, now: Conditions) -> Expression:
-        """The flow under these conditions; a subclass says it."""
-        raise NotImplementedError
-
-    def terms(self, now: Conditions) -> Iterator[MassFlow]:
-        yield MassFlow(self.chamber, self.flow_kg_s(now), now[self.chamber].temperature_k)
-
-
-@dataclass(frozen=True, kw_only=True)
-class ConstantFlow(EmpiricalFlow):
-    """mdot = a."""
-
-    causes = _cause(CONSTANT, "constant_kg_s", Balance.MASS)
-    formula = "mdot = a"
-    constant_kg_s: Expression = strength(typical=1e-4, lower=-1e-2, upper=1e-2)
-
-    def flow_kg_s(self, now: Conditions) -> Expression:
-        return self.constant_kg_s
-
-
-@dataclass(frozen=True, kw_only=True)
-class PressureFlow(EmpiricalFlow):
-    """mdot = a p / p_s, with the pressure of the supply."""
-
-    causes = _cause("p/p_s", "pressure_kg_s", Balance.MASS)
-    formula = "mdot = a p/p_s"
-    supply: str = "supply"
-    pressure_kg_s: Expression = strength(typical=1e-4, lower=-1e-2, upper=1e-2)
-
-    def flow_kg_s(self, now: Conditions) -> Expression:
-        return self.pressure_kg_s * now[self.chamber].pressure_pa / now[self.supply].pressure_pa
-
-
-@dataclass(frozen=True, kw_only=True)
-class SpeedFlow(EmpiricalFlow):
-    """mdot = a |v| with the speed of the body that closes the chamber."""
-
-    causes = _cause("|v|", "speed_kg_m", Balance.MASS)
-    formula = "mdot = a |v|"
-    body: str
-    speed_kg_m: Expression = strength(typical=5e-4, lower=-1e-1, upper=1e-1)
-
-    def flow_kg_s(self, now: Conditions) -> Expression:
-        return self.speed_kg_m * size_of(now[self.body].velocity_m_s, ROUND_M_S)
-
-
-class _Scaled:
+class Scaled:
     """What is counted in sizes of the recordings, by the factors of its feature."""
 
     feature: Feature
@@ -196,7 +139,7 @@ class _Scaled:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ScaledForce(_Scaled, EmpiricalForce):
+class ScaledForce(Scaled, EmpiricalForce):
     """F = a g(v / v_0, 2 (x - x_m) / L, (p_1 - p_2) / p_0), in sizes of the recordings.
 
     ``chambers`` are two whose pressures push the body, each against the other, or one and what is
@@ -217,7 +160,7 @@ class ScaledForce(_Scaled, EmpiricalForce):
 
     @property
     def causes(self) -> tuple[Cause, ...]:
-        return _cause(written(self.feature), "size_n", Balance.MOMENTUM)
+        return cause_of(written(self.feature), "size_n", Balance.MOMENTUM)
 
     @property
     def formula(self) -> str:
@@ -246,45 +189,6 @@ class ScaledDrag(ScaledForce):
 
     direction = -1.0
     size_n: Expression = strength(typical=20.0, lower=-2.0, upper=500.0)
-
-
-@dataclass(frozen=True, kw_only=True)
-class ScaledFlow(_Scaled, EmpiricalFlow):
-    """mdot = a g(v / v_0, (p - p_amb) / p_0, (u - u_0) / U), in sizes of the recordings.
-
-    The command is what reaches the valve; ``rest`` and ``span`` are its u_0 and U in its own unit.
-    ``outside`` is the part with p_amb.
-
-    Source: diagnosis.md 1.9.
-    """
-
-    feature: Feature
-    outside: str
-    body: str | None = None
-    command: str | None = None
-    rest: float = 0.0
-    span: float = 1.0
-    size_kg_s: Expression = strength(typical=1e-4, lower=-1e-2, upper=1e-2)
-    speed_m_s: Expression = form(1.0, lower=1e-6)
-    pressure_pa: Expression = form(1e5, lower=1.0)
-
-    @property
-    def causes(self) -> tuple[Cause, ...]:
-        return _cause(written(self.feature), "size_kg_s", Balance.MASS)
-
-    @property
-    def formula(self) -> str:
-        """As it is told, everything in its sizes."""
-        return f"mdot = a {written(self.feature)}"
-
-    def flow_kg_s(self, now: Conditions) -> Expression:
-        gauge_pa = now[self.chamber].pressure_pa - now[self.outside].pressure_pa
-        here = Here(
-            speed=now[self.body].velocity_m_s / self.speed_m_s if self.body else 0.0,
-            pressure=gauge_pa / self.pressure_pa,
-            command=(now.read(self.command) - self.rest) / self.span if self.command else 0.0,
-        )
-        return self.size_kg_s * product(self.feature, here)
 
 
 FORCES: tuple[type[EmpiricalForce], ...] = (SquareDrag, CubicDrag, PlacedDrag, CurvedForce)
