@@ -7,7 +7,7 @@ law was fitted to: outside of it nobody knows what it is worth.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from math import inf
 from typing import Any
 
@@ -43,6 +43,7 @@ from workbench.vessel import LumpedPressure
 
 PREFIX = "law["
 Ranges = Mapping[str, tuple[float, float]]
+Groups = Sequence[tuple[tuple[Feature, ...], Mapping[str, Any]]]  # features, what they need
 
 
 def is_law(name: str) -> bool:
@@ -97,26 +98,28 @@ def _flows(plant: Plant, part: GasVolume) -> Iterator[Effect]:
     body = getattr(part, "body", None)
     if body:
         yield SpeedFlow(name=_named(SpeedFlow, part.name), **at, body=body)
-    for outside in _outside(plant):
-        moved = [(MOVED_FLOWS, {"body": body})] if body else []
-        for features, more in ((GAUGE_FLOWS, {}), *moved, *_commanded(plant)):
-            for feature in features:
-                name = _written(feature, part.name)
-                yield ScaledFlow(name=name, feature=feature, outside=outside, **at, **more)
+    moved = [(MOVED_FLOWS, {"body": body})] if body else []
+    yield from _fillings(ScaledFlow, plant, part.name, moved)
 
 
 def _rates(plant: Plant, part: LumpedPressure) -> Iterator[Effect]:
     """As those into a volume of gas, of a pressure that knows no gas and closes with no body."""
-    at = {"chamber": part.name}
-    yield ConstantRate(name=_named(ConstantRate, part.name), **at)
+    yield ConstantRate(name=_named(ConstantRate, part.name), chamber=part.name)
+    yield from _fillings(ScaledRate, plant, part.name)
+
+
+def _fillings(
+    kind: type[ScaledFlow] | type[ScaledRate], plant: Plant, chamber: str, moved: Groups = ()
+) -> Iterator[Effect]:
+    """What fills a chamber by its pressure above ambient, by a body's speed, and by the command."""
     for outside in _outside(plant):
-        for features, more in ((GAUGE_FLOWS, {}), *_commanded(plant)):
+        for features, more in ((GAUGE_FLOWS, {}), *moved, *_commanded(plant)):
             for feature in features:
-                name = _written(feature, part.name)
-                yield ScaledRate(name=name, feature=feature, outside=outside, **at, **more)
+                name = _written(feature, chamber)
+                yield kind(name=name, feature=feature, chamber=chamber, outside=outside, **more)
 
 
-def _commanded(plant: Plant) -> list[tuple[tuple[Feature, ...], dict[str, Any]]]:
+def _commanded(plant: Plant) -> Groups:
     """What goes by the command; nothing where there are several."""
     return [(COMMANDED_FLOWS, _command(plant))] if len(plant.commands) == 1 else []
 

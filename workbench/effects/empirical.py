@@ -128,9 +128,26 @@ class CurvedForce(EmpiricalForce):
 
 
 class Scaled:
-    """What is counted in sizes of the recordings, by the factors of its feature."""
+    """What is counted in sizes of the recordings, by the factors of its feature.
+
+    ``coefficient`` is its strength, in ``balance``; ``told`` is how its formula begins.
+    """
+
+    coefficient: ClassVar[str]
+    balance: ClassVar[Balance]
+    told: ClassVar[str]
 
     feature: Feature
+
+    @property
+    def causes(self) -> tuple[Cause, ...]:
+        """The one cause that it is."""
+        return cause_of(written(self.feature), self.coefficient, self.balance)
+
+    @property
+    def formula(self) -> str:
+        """As it is told, everything in its sizes."""
+        return f"{self.told} {written(self.feature)}"
 
     @property
     def counted_in(self) -> tuple[str, ...]:
@@ -148,6 +165,9 @@ class ScaledForce(Scaled, EmpiricalForce):
     Source: diagnosis.md 1.9.
     """
 
+    coefficient = "size_n"
+    balance = Balance.MOMENTUM
+    told = "F = a"
     direction: ClassVar[float] = 1.0
 
     feature: Feature
@@ -157,15 +177,6 @@ class ScaledForce(Scaled, EmpiricalForce):
     middle_m: Expression = form(0.0, lower=-inf)
     stroke_m: Expression = form(0.1, lower=1e-6)
     pressure_pa: Expression = form(1e5, lower=1.0)
-
-    @property
-    def causes(self) -> tuple[Cause, ...]:
-        return cause_of(written(self.feature), "size_n", Balance.MOMENTUM)
-
-    @property
-    def formula(self) -> str:
-        """As it is told, everything in its sizes."""
-        return f"F = {'-' if self.direction < 0.0 else ''}a {written(self.feature)}"
 
     def terms(self, now: Conditions) -> Iterator[Force]:
         moved, across_pa = now[self.body], 0.0
@@ -187,6 +198,7 @@ class ScaledDrag(ScaledForce):
     Source: diagnosis.md 1.9.
     """
 
+    told = "F = -a"
     direction = -1.0
     size_n: Expression = strength(typical=20.0, lower=-2.0, upper=500.0)
 

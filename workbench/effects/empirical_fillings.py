@@ -12,7 +12,6 @@ from typing import ClassVar
 
 from workbench.effect import (
     Balance,
-    Cause,
     Conditions,
     Effect,
     Expression,
@@ -21,7 +20,7 @@ from workbench.effect import (
     strength,
 )
 from workbench.effects.empirical import CONSTANT, ROUND_M_S, Scaled, cause_of
-from workbench.effects.law_features import Feature, Here, product, size_of, written
+from workbench.effects.law_features import Feature, Here, product, size_of
 from workbench.vessel import PressureRate
 
 TYPICAL_PA_S, MOST_PA_S = 1e5, 1e7  # chosen, beside the 9e6 of an open valve in physics.md 2.6
@@ -103,6 +102,8 @@ class ScaledFilling(Scaled, EmpiricalFilling):
     Source: diagnosis.md 1.9.
     """
 
+    balance = Balance.MASS
+
     feature: Feature
     outside: str
     body: str | None = None
@@ -130,16 +131,9 @@ class ScaledFlow(ScaledFilling, EmpiricalFlow):
     Source: diagnosis.md 1.9.
     """
 
+    coefficient = "size_kg_s"
+    told = "mdot = a"
     size_kg_s: Expression = strength(typical=1e-4, lower=-1e-2, upper=1e-2)
-
-    @property
-    def causes(self) -> tuple[Cause, ...]:
-        return cause_of(written(self.feature), "size_kg_s", Balance.MASS)
-
-    @property
-    def formula(self) -> str:
-        """As it is told, everything in its sizes."""
-        return f"mdot = a {written(self.feature)}"
 
     def flow_kg_s(self, now: Conditions) -> Expression:
         return self.size_kg_s * self.share(now)
@@ -167,16 +161,9 @@ class ScaledRate(ScaledFilling):
     Source: diagnosis.md 1.9.
     """
 
+    coefficient = "size_pa_s"
+    told = "dp/dt = a"
     size_pa_s: Expression = strength(typical=TYPICAL_PA_S, lower=-MOST_PA_S, upper=MOST_PA_S)
-
-    @property
-    def causes(self) -> tuple[Cause, ...]:
-        return cause_of(written(self.feature), "size_pa_s", Balance.MASS)
-
-    @property
-    def formula(self) -> str:
-        """As it is told, everything in its sizes."""
-        return f"dp/dt = a {written(self.feature)}"
 
     def terms(self, now: Conditions) -> Iterator[PressureRate]:
         yield PressureRate(self.chamber, self.size_pa_s * self.share(now))
