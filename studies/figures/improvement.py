@@ -32,8 +32,8 @@ def budget_figure(budget: Sequence[Stage]) -> Figure:
 
     The axis is logarithmic, or the last steps could not be seen beside the first, and bars rise
     from 1, where nothing but sensor noise is left, if none falls so low.  Outlines reach up to the
-    step before (or down, where an effect was dropped).  What the backward and the swap pass did,
-    and empirical terms, stand on a grey ground with a word.
+    step before (or down, where an effect was dropped).  Shifts of what was there, what the backward
+    and the swap pass did, and empirical terms stand on a grey ground with a word.
     """
     wide = len(budget) > WIDE_FROM
     with styled():
