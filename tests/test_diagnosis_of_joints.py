@@ -23,7 +23,7 @@ from workbench.recording import Recording
 from workbench.rig import default_rig
 
 MS, STEP_S = 1e-3, 5e-5
-PAYLOAD_KG, MORE_FRICTION_N, LEAK, BESIDE_PA_S = 0.3, 30.0, 0.01, 1e5
+PAYLOAD_KG, MORE_FRICTION_N, LEAK, BESIDE_PA_S, BYPASS_PA_S = 0.3, 30.0, 0.01, 1e5, 1e6
 GAS_PA, NOISE_PA, NOISE_RAD = 3.7565e5, 300.0, 5e-4
 MOST_V, LEAST_V = 10.0, 0.0
 PLANTS_WITH_PAYLOAD = {
@@ -128,12 +128,16 @@ def test_long_rests_do_not_hide_what_the_motion_shows():
     [
         (lambda c, out: BESIDE_PA_S, "constant", lambda most_pa: BESIDE_PA_S),
         (lambda c, out: -0.5 * abs(2.0 * c - 1.0) * out, "|u| p", lambda most_pa: -0.5 * most_pa),
+        (lambda c, out: BYPASS_PA_S * (2.0 * c - 1.0), "u", lambda most_pa: BYPASS_PA_S),
     ],
 )
 def test_what_no_effect_does_to_a_pressure_without_gas_is_a_law_of_its_rate(
     beside, term, size_pa_s
 ):
-    """A flow controller beside the valve, or a vent that opens with it; only gas had laws."""
+    """A flow controller beside the valve, a vent that opens with it, a bypass valve.
+
+    Only gas had laws; and the bypass was told as an offset and a scale of the sensor together.
+    """
     made = [bellows_recording(seed, beside=beside) for seed in (1, 2)]
     found = diagnose(default_rig("soft_joint_parametric"), made[:1], made[1:])
     most_pa = made[0]["bellows.pressure_pa"].max()

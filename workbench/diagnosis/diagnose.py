@@ -174,7 +174,9 @@ def _law(
     is to leave a fifth less than every effect, and only less than the best shift; what fails
     another criterion than its share is no rival.  The scan of an effect that leaves half, or keeps
     little of its drop on what is held out, bars no law, and neither does a share that a whole crowd
-    removes: a sagging cable is a force to four sensors, and its curve is what they leave.
+    removes: a sagging cable is a force to four sensors, and its curve is what they leave.  A pair
+    is as free as a law is, and bars none either: an offset and a scale of one sensor followed a
+    bypass valve.
 
     A law is an unknown input to a balance: where none of them gains by any course of one there is
     none, and what a law removes is what small differences leave near the noise.
@@ -183,7 +185,8 @@ def _law(
         return None
     leader = ranking[0] if ranking else None
     certain = leader and leader.accepted and leader.kind is Kind.EFFECT
-    if leader and certain and not leader.crowd and share_removed(leader) >= CERTAIN_SHARE:
+    alone = leader and not leader.crowd and len(leader.candidate.singles) == 1
+    if certain and alone and share_removed(leader) >= CERTAIN_SHARE:
         return None
     progress("empirical law")
     most = certain and share_removed(leader) >= MOST_SHARE
