@@ -7,11 +7,16 @@ stand first, and nothing should be said of them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from studies.hidden_benches import SERVO_DRIVE as DRIVE
+from studies.hidden_effects import recordings
+from studies.truth.case import Case
+from studies.truth.cases import read_cases
 from workbench.consistency import examined
 from workbench.recording import Recording
 from workbench.rig import Rig
@@ -130,16 +135,16 @@ def said(rig: Rig, recording: Recording) -> str:
     return " | ".join(found) or "nothing"
 
 
-if __name__ == "__main__":
-    import sys
-
-    from studies.hidden_effects import recordings, user_rig
-    from studies.truth.cases import read_cases
-
-    seeds = {int(seed) for seed in sys.argv[1:]} or {1}
-    chosen = [case for (_, seed), case in read_cases().items() if seed in seeds]
-    pairs = recordings(chosen)
+def lines(cases: Sequence[Case]) -> Iterator[str]:
+    """What is said of the training recordings of some cases of the drive, spoiled in every way."""
+    made = [train for train, _ in recordings(cases)]
     for name, spoil in SERVO_DRIVE.items():
-        for case, (train, _) in zip(chosen, pairs, strict=True):
-            label = f"{name:<27}{case.hidden or 'nothing':<22}{case.seed:>2}"
-            print(f"{label}  {said(user_rig(case), spoil(train))}", flush=True)
+        for case, train in zip(cases, made, strict=True):
+            label = f"{name:<29}{case.hidden or 'nothing':<22}{case.seed:>2}"
+            yield f"{label}  {said(DRIVE.user_rig(case), spoil(train))}"
+
+
+if __name__ == "__main__":
+    seeds = {int(seed) for seed in sys.argv[1:]} or {1}
+    for line in lines([case for (_, seed), case in read_cases().items() if seed in seeds]):
+        print(line, flush=True)

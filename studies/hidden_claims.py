@@ -17,7 +17,7 @@ from scipy.stats import binom
 
 from studies.figures.confusion import confusion_figure
 from studies.hidden_benches import BENCHES, SERVO_DRIVE
-from studies.hidden_rows import Kind, Row, counts, plain, table
+from studies.hidden_rows import Kind, Row, confusion, counts, plain, table
 from studies.study import Claim, Extent, Outcome
 from workbench.diagnosis.result import Verdict
 
@@ -30,7 +30,7 @@ MAPPED = (Kind.EFFECT, Kind.LAW, Kind.NOTHING)  # in the confusion matrix
 
 
 def outcome(rows: Sequence[Row], extent: Extent = Extent.FULL) -> Outcome:
-    """Table, claims and figures of all answers, or of the sample of the quick grid."""
+    """Tables, claims and figures of all answers, or of the sample of the quick grid."""
     enough = _all_of_it if extent is Extent.FULL else _of_a_sample
     mapped = [row for row in rows if row.kind in MAPPED]
     figures = {
@@ -41,7 +41,7 @@ def outcome(rows: Sequence[Row], extent: Extent = Extent.FULL) -> Outcome:
         for plant in dict.fromkeys(row.plant for row in mapped)
     }
     claims = tuple(chain(_of_effects(rows, enough), _of_others(rows, enough)))
-    text = "\n\n".join((table(rows), counts(rows)))
+    text = "\n\n".join((table(rows), confusion(mapped), counts(rows)))
     return Outcome(text, claims, figures, {"rows": [plain(row) for row in rows]})
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from enum import Enum
@@ -131,6 +132,20 @@ def table(rows: Sequence[Row]) -> str:
                 _number(row.seconds, ".0f"),
             )
             for row in rows
+        ],
+    )
+
+
+def confusion(rows: Sequence[Row]) -> str:
+    """The confusion matrix without its empty cells: what led the ranking, and how often."""
+    led: dict[tuple[str, str], Counter[str]] = {}
+    for row in rows:
+        led.setdefault((row.plant, row.hidden), Counter())[row.first or "-"] += 1
+    return columns(
+        ("plant", "hidden", "first in the ranking, and how often"),
+        [
+            (plant, hidden, ", ".join(f"{name} {count}" for name, count in firsts.most_common()))
+            for (plant, hidden), firsts in led.items()
         ],
     )
 

@@ -5,6 +5,7 @@ from the flat oracles or are real.
 """
 
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 import oracle_crr_rig
@@ -16,6 +17,7 @@ from test_diagnosis import bench, nothing
 from studies import adversarial as spoil
 from studies.demo import DATA
 from studies.documents import comparison_document
+from studies.truth.cases import read_cases
 from workbench.comparison import compare
 from workbench.consistency import Finding, Weight, examined, trusted
 from workbench.diagnosis.diagnose import diagnose
@@ -47,6 +49,16 @@ def test_nothing_is_said_of_good_recordings(demo):
     rig, *recordings = demo
 
     assert [said(rig, each) for each in recordings] == [[], []]
+
+
+@pytest.mark.slow
+def test_the_study_tells_a_spoiled_recording_from_one_with_a_missing_effect():
+    """The first lines of what ``python -m studies.adversarial`` prints, of one case."""
+    case = read_cases()["piston_leak", 1]
+    as_it_is, exchanged = islice(spoil.lines([case]), 2)
+
+    assert as_it_is.split()[-3:] == ["piston_leak", "1", "nothing"]
+    assert "refused: chamber_a.pressure and chamber_b.pressure look exchanged" in exchanged
 
 
 @pytest.mark.parametrize(("first", "samples"), [(0, 300), (1500, 300), (7500, 300), (1500, 500)])

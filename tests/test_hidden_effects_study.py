@@ -30,6 +30,14 @@ def held(found):
     return {claim.claim.partition(",")[0]: claim.holds for claim in found.claims}
 
 
+def test_the_confusion_matrix_is_printed():
+    rows = [row(seed=1), row(seed=2), row(first="stiction", place=2, seed=3), row("valve_lag")]
+    printed = [line.split(maxsplit=2) for line in outcome(rows).text.splitlines()]
+
+    assert ["servo_drive", "coulomb_friction", "coulomb_friction 2, stiction 1"] in printed
+    assert ["servo_drive", "valve_lag", "valve_lag 1"] in printed
+
+
 def test_answers_of_other_code_are_told(tmp_path):
     several = tasks(Extent.QUICK)[:3]
     kept = Kept(tmp_path / hidden_study.ANSWERS)

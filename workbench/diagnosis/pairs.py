@@ -51,15 +51,17 @@ def with_pairs(
     if not _wanted(problem, ranking):
         return ranking
     best = max((r.drop_train for r in ranking if r.fit and predicts_row(r)), default=0.0)
-    refits = _refits(problem, profiles, best, progress)
+    begun = _begun(problem, profiles, best, progress)
+    scanned = {each.profile.candidate.name: each.profile for each in begun}
+    refits = _refits(problem, begun, progress)
     against = {r.candidate.name: _reasons(problem, r, ranking) for r in refits}
     sound = [each for each in refits if not against[each.candidate.name]]
-    group = tie_group(problem, sound, {}) if sound else []
+    group = tie_group(problem, sound, scanned) if sound else []
     names = [each.candidate.name for each in group]
     rows = {}
     for each in refits:
         name = each.candidate.name
-        own = refitted_row(problem, each)
+        own = replace(refitted_row(problem, each), compensable=scanned[name].compensation)
         rows[name] = replace(own, accepted=not against[name], reasons=against[name])
     accepted = grouped([rows[name] for name in names])
     refused = [row for name, row in rows.items() if name not in names]
@@ -86,10 +88,10 @@ def _wanted(problem: Problem, ranking: tuple[Ranked, ...]) -> bool:
     return not settled and needed(problem, 2) < problem.misfit
 
 
-def _refits(
+def _begun(
     problem: Problem, profiles: Sequence[Profile], best: float, progress: Progress
-) -> list[Refit]:
-    """Refits of the most promising pairs, best first; ``best`` is the share of the best single."""
+) -> list[Rough]:
+    """First fits of pairs, best first, that beat ``best``, the share of the best single effect."""
     gains = pair_gains(problem, profiles, LEAST_SHARE * problem.misfit, MOST_PAIRS)
     if not gains:
         return []
@@ -97,11 +99,15 @@ def _refits(
     least = max(2 * LEAST_TRAINING, best)
     begun = [_first_fit(problem, each.profile) for each in gains]
     begun = sorted((b for b in begun if b.share > least), key=lambda each: -each.share)
+    return [each for each in begun if each.share > (1.0 - CLOSE_DROP) * begun[0].share]
+
+
+def _refits(problem: Problem, begun: Sequence[Rough], progress: Progress) -> list[Refit]:
+    """Refits of the most promising pairs, best first."""
     refits = []
     for each in begun:
-        if each.share > (1.0 - CLOSE_DROP) * begun[0].share:
-            progress(f"refit with {each.profile.candidate.name}")
-            refits.append(refit(problem, each))
+        progress(f"refit with {each.profile.candidate.name}")
+        refits.append(refit(problem, each))
     return sorted(refits, key=lambda each: (not predicts(each), -each.drop_train))
 
 
