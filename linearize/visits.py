@@ -10,7 +10,7 @@ import numpy as np
 
 from linearize.reduction import DesignModel, offset
 from workbench.called import result
-from workbench.comparison.run import plant_for, run
+from workbench.comparison.run import plant_for, simulate
 from workbench.effects.forces import EndStops
 from workbench.effects.solenoid_valve import SolenoidValve
 from workbench.plant import Plant
@@ -113,7 +113,7 @@ def recorded_visits(
         starts=tuple(start * per_sample for start in recording.starts),
     )
     plant = plant_for(rig, finer).lean()
-    return visited(model, plant, run(rig, finer), at_stops)
+    return visited(model, plant, simulate(rig, finer), at_stops)
 
 
 def joined(parts: Sequence[Visited]) -> Visited:

@@ -27,7 +27,7 @@ from studies.modes_text import region_table
 from studies.study import Claim, Extent, Outcome, Study
 from studies.text import columns
 from studies.truth.cases import read_cases
-from workbench.comparison.run import run as run_rig
+from workbench.comparison.run import simulate
 from workbench.reading import read_recording
 from workbench.recording import Recording
 from workbench.rig import Rig, load_rig
@@ -109,7 +109,7 @@ def _seen(rig: Rig, hybrid: HybridModel) -> dict[str, Visited]:
     lean = rig.plant.lean()
 
     def gone(recording: Recording) -> Visited:
-        return visited(hybrid.model, lean, run_rig(rig, recording))
+        return visited(hybrid.model, lean, simulate(rig, recording))
 
     own = [gone(read_recording(rig, DATA / f"{name}.csv")) for name in (PLACED_ON, JUDGED_ON)]
     cases = read_cases()

@@ -5,7 +5,7 @@ from functools import cache
 import studies.demo
 from linearize.reduction import design_model
 from linearize.visits import Visited, visited
-from workbench.comparison.run import run
+from workbench.comparison.run import simulate
 from workbench.reading import read_recording
 from workbench.rig import load_rig
 
@@ -16,5 +16,5 @@ FOLDER = studies.demo.DATA
 def gone_through(name: str) -> Visited:
     """What the drive visits under the recorded commands of ``train`` or ``validation``."""
     rig = load_rig(FOLDER / "rig.toml")
-    simulated = run(rig, read_recording(rig, FOLDER / f"{name}.csv"))
+    simulated = simulate(rig, read_recording(rig, FOLDER / f"{name}.csv"))
     return visited(design_model(rig.plant), rig.plant.lean(), simulated)

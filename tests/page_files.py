@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from workbench.comparison.run import run
+from workbench.comparison.run import simulate
 from workbench.reading import write_recording
 from workbench.recording import Recording
 from workbench.rig import load_rig
@@ -20,7 +20,7 @@ def drive_files(folder, seconds=0.8, leak="0.3 mm^2"):
         command = np.full(n, truth.plant.commands[0].nominal)
         command[n // 8 : n // 3] += opening
         command[n // 2 : 3 * n // 4] -= 0.9 * opening
-        made = run(truth, Recording(name, 1e-3, {"valve.command_v": command}))
+        made = simulate(truth, Recording(name, 1e-3, {"valve.command_v": command}))
         kept = {"valve.command_v", *truth.plant.measured}
         noise = {"slide.position_m": 1e-5}
         channels = {

@@ -23,7 +23,7 @@ from workbench.comparison.compare import (
 from workbench.comparison.deviation import ShiftDeviation
 from workbench.comparison.horizons import lost
 from workbench.comparison.regimes import regimes, shares
-from workbench.comparison.run import run
+from workbench.comparison.run import simulate
 from workbench.errors import InputError
 from workbench.recording import Recording
 from workbench.rig import default_rig
@@ -44,7 +44,7 @@ def measured(rig, times=1):
     """The rig's outputs under the commands, so many times, with seeded noise, as a recording."""
     once = commands()
     played = {name: np.tile(values, times) for name, values in once.channels.items()}
-    clean, rng = run(rig, replace(once, channels=played)), np.random.default_rng(3)
+    clean, rng = simulate(rig, replace(once, channels=played)), np.random.default_rng(3)
     noisy = {n: clean[n] + s * rng.standard_normal(len(clean)) for n, s in NOISE.items()}
     kept = {"valve.command_v": clean["valve.command_v"], **noisy}
     return replace(clean, channels=kept, noise=NOISE)
@@ -187,7 +187,7 @@ def test_a_plant_without_states_is_compared_sample_by_sample():
 
 def test_a_run_without_the_command_is_refused(drive):
     with pytest.raises(InputError, match=r"servo_drive needs valve\.command"):
-        run(drive, Recording("empty", DT, {"supply.pressure_pa": np.full(10, 7e5)}))
+        simulate(drive, Recording("empty", DT, {"supply.pressure_pa": np.full(10, 7e5)}))
 
 
 def test_the_document_holds_noise_regimes_shifts_and_whiteness(drive, bad):
@@ -269,7 +269,7 @@ def test_without_position_and_commands_there_are_fewer_maps():
 def test_a_plant_with_one_state_is_compared_over_all_horizons():
     joint, n = default_rig("soft_joint"), 400
     commands = Recording("fill", 2.5e-3, {"valve.pwm": np.repeat([0.5, 0.7, 0.5, 0.3], n // 4)})
-    clean = run(joint, commands)
+    clean = simulate(joint, commands)
     noisy = clean["bellows.pressure_pa"] + 1e3 * np.random.default_rng(4).standard_normal(n)
     recording = replace(commands, channels={**commands.channels, "bellows.pressure_pa": noisy})
 

@@ -15,7 +15,7 @@ from studies.documents import diagnosis_document
 from studies.improvement_text import improvement_text
 from studies.text_of_results import unit_names
 from workbench.comparison import compare
-from workbench.comparison.run import run
+from workbench.comparison.run import simulate as run
 from workbench.diagnosis.addition import add
 from workbench.diagnosis.diagnose import diagnose
 from workbench.diagnosis.improve import improve

@@ -70,6 +70,8 @@ def test_the_verbs_are_functions_of_the_package_and_imported_when_asked_for():
     told = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True)
 
     assert told.stdout.split()[:3] == ["False", "<function", "compare"], told.stderr
+    verbs = {"simulate", "compare", "diagnose", "add", "improve", "fit"}
+    assert verbs <= {*workbench.__all__}
     for verb in workbench.__all__:
         assert getattr(workbench, verb).__name__ == verb
     with pytest.raises(AttributeError, match="no attribute 'compere'"):

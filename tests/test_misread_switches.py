@@ -7,7 +7,7 @@ import pytest
 from driven_gearbox import DRIVEN
 
 from studies import adversarial as spoil
-from workbench.comparison.run import run
+from workbench.comparison.run import simulate
 from workbench.consistency import Weight, examined
 from workbench.rig import default_rig
 
@@ -18,7 +18,7 @@ NOISE = {"pressure_pa": 300.0, "position_m": 2e-5}
 def gearbox():
     """The gearbox's rig and what it records of the manoeuvre, with noise."""
     rig, rng = default_rig("gearbox"), np.random.default_rng(4)
-    made = run(rig, DRIVEN)
+    made = simulate(rig, DRIVEN)
     sigma = {name: NOISE.get(name.rpartition(".")[2], 0.0) for name in made.channels}
     rows = {k: v + sigma[k] * rng.standard_normal(len(v)) for k, v in made.channels.items()}
     return rig, replace(made, channels=rows)

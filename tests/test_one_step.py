@@ -13,7 +13,7 @@ from workbench.comparison import compare, horizons
 from workbench.comparison.compare import FREE_RUN, ONE_STEP, WINDOW
 from workbench.comparison.course import course_of
 from workbench.comparison.regimes import regime_shares
-from workbench.comparison.run import run
+from workbench.comparison.run import simulate
 from workbench.fitting.start_states import refit_starts
 from workbench.fitting.windows import cut_windows
 from workbench.recording import Recording
@@ -97,7 +97,7 @@ def test_a_gearbox_is_foretold_as_closely_as_its_noise():
     """The valve is released while the piston travels: the current of its coil dies away."""
     rig, n = default_rig("gearbox"), 260
     held = {"valve_1.command": 1.0 * (np.arange(n) < 60), "valve_2.command": np.zeros(n)}
-    clean, rng = run(rig, Recording("a shift", DT, held)), np.random.default_rng(6)
+    clean, rng = simulate(rig, Recording("a shift", DT, held)), np.random.default_rng(6)
     noise = {k: 2e-5 if k.endswith("position_m") else 1e3 for k in rig.plant.measured}
     noisy = {k: clean[k] + size * rng.standard_normal(n) for k, size in noise.items()}
 
@@ -119,7 +119,7 @@ def own_simulation(plant_name, share):
             values[100:300] += 0.2 * (signal.upper - signal.nominal)
             values[400:500] -= 0.2 * (signal.nominal - signal.lower)
         played[signal.name] = values
-    clean = run(rig, Recording("its own", 1e-3, played))
+    clean = simulate(rig, Recording("its own", 1e-3, played))
     noise = {name: share * float(np.ptp(clean[name])) for name in rig.plant.measured}
     noisy = {name: clean[name] + s * random.standard_normal(N) for name, s in noise.items()}
     return rig, Recording("its own", 1e-3, {**played, **noisy}, noise=noise)
@@ -188,7 +188,7 @@ def shift():
     """A gearbox, where nothing measures the control chamber."""
     rig, n = default_rig("gearbox"), 120
     held = {"valve_1.command": 1.0 * (np.arange(n) < 60), "valve_2.command": np.zeros(n)}
-    clean = run(rig, Recording("a shift", 1e-3, held))
+    clean = simulate(rig, Recording("a shift", 1e-3, held))
     noise = {k: 2e-5 if k.endswith("position_m") else 1e3 for k in rig.plant.measured}
     return rig, replace(clean, noise=noise)
 

@@ -36,7 +36,8 @@ def simulate(
     own initial state.
     """
     with answering(quiet) as say:
-        from workbench.comparison.run import read_inputs, run
+        from workbench.comparison.run import read_inputs
+        from workbench.comparison.run import simulate as simulated
         from workbench.reading.writer import write_recording
         from workbench.rig import load_rig
 
@@ -45,7 +46,7 @@ def simulate(
         found = load_rig(rig)
         recording = read_inputs(found, inputs)
         say(f"simulating {len(recording)} samples of {recording.name}")
-        write_recording(run(found, recording), output, ambient_pa=found.ambient_pa)
+        write_recording(simulated(found, recording), output, ambient_pa=found.ambient_pa)
         typer.echo(f"wrote {output}")
 
 

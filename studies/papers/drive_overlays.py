@@ -22,7 +22,7 @@ from studies.identification_chain import sine
 from studies.papers.findings import Finding
 from studies.study import Claim
 from studies.truth import dedicated as truth
-from workbench.comparison.run import run
+from workbench.comparison.run import simulate
 from workbench.differentiator import derivative
 from workbench.plants.servo_drive import AREA_M2, CENTRE_V, STROKE_M, SUPPLY_PA
 from workbench.recording import Recording
@@ -87,7 +87,7 @@ def overlays(drive: Rig, tank: Rig) -> dict[str, Overlay]:
 
 
 def _beside(rig: Rig, seen: Recording) -> Overlay:
-    found = run(rig, seen)
+    found = simulate(rig, seen)
     both = [{n: each[n] for n in UNITS if n in seen.channels} for each in (seen, found)]
     if POSITION in seen.channels:
         for each in both:

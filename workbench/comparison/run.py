@@ -12,7 +12,7 @@ from workbench.plant import Plant
 from workbench.reading import read_recording
 from workbench.recording import Recording
 from workbench.rig import Rig
-from workbench.simulation import simulate
+from workbench.simulation import simulate as simulate_plant
 from workbench.units import public_name
 
 
@@ -27,7 +27,7 @@ def read_inputs(rig: Rig, path: Path | str) -> Recording:
     return read_recording(replace(rig, reader=replace(rig.reader, channels=channels)), path)
 
 
-def run(rig: Rig, recording: Recording) -> Recording:
+def simulate(rig: Rig, recording: Recording) -> Recording:
     """The nonlinear plant under recorded inputs: inputs, states and outputs, piece by piece.
 
     Each piece starts from its first recorded sample where outputs were recorded, else from the
@@ -42,7 +42,7 @@ def run(rig: Rig, recording: Recording) -> Recording:
         If the solution is not finite.
     """
     plant = plant_for(rig, recording).lean()
-    pieces = [simulate(plant, p, guessed_states(plant, p)[0, :, 0]) for p in recording.pieces]
+    pieces = [simulate_plant(plant, p, guessed_states(plant, p)[0, :, 0]) for p in recording.pieces]
     found = _joined(recording, pieces)
     warn_beyond(rig, found)
     return found
