@@ -34,7 +34,8 @@ def held_out_n(found):
 
 @pytest.mark.filterwarnings("ignore::workbench.reading.RecordingWarning")
 @pytest.mark.parametrize(
-    "seal", ["KDN", "X-ring257", pytest.param("O-ring257", marks=pytest.mark.slow)]
+    "seal",
+    ["KDN", *(pytest.param(seal, marks=pytest.mark.slow) for seal in ("X-ring257", "O-ring257"))],
 )
 def test_the_bench_starts_with_coulomb_friction_and_ends_at_the_best_held_out_error(seal):
     found = improved(seal)

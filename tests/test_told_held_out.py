@@ -36,6 +36,7 @@ add = ["chamber_leak@chamber_b", "stiction"]
 """
 
 
+@pytest.mark.slow
 def test_held_out_errors_with_an_effect_are_weighed_by_what_is_left_with_it():
     """By those of the rig without it the position was told ten times further off than it is."""
     case = read_cases(SERVO_DRIVE.truth.stored)["coulomb_friction", 1]
