@@ -76,6 +76,8 @@ def where_text(found: Diagnosis) -> str:
     if where.certain and follows:
         lines.append(f"missing term of {where.balance} follows {', '.join(follows)}")
         lines += [] if where.memory is None else [_memory_text(*where.memory)]
+    if where.by_law:
+        lines.append(f"the law acts in {where.balance}: refits of windows decide, not this gain")
     lines += _elsewhere(found, where)
     shares = [f"{name} {percent(share)}" for name, share in where.by_regime.items()][:4]
     left = f"error left by the prior fit (regimes overlap): {', '.join(shares)}"

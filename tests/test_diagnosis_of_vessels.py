@@ -5,12 +5,13 @@ it the workbench's.
 """
 
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from workbench.balances import BalanceEquation
-from workbench.diagnosis.diagnose import diagnose
+from workbench.diagnosis.diagnose import _where_told, diagnose
 from workbench.diagnosis.result import Verdict
 from workbench.diagnosis.suspects import suspects, wandering, with_missing_flows
 from workbench.diagnosis.where import locate
@@ -226,6 +227,19 @@ def test_what_is_missing_is_followed_through_all_training_recordings(leaking):
     assert both.by_balance["chamber.mass"] > first.by_balance["chamber.mass"] + 50.0
     assert both.term[in_first].mean() == pytest.approx(first.term.mean(), rel=0.02)
     assert both.term[~in_first].mean() < 0.5 * first.term.mean() < 0.0  # gas leaves there too
+
+
+@pytest.mark.parametrize("named", ["chamber.mass", "chamber.energy"])
+def test_where_is_the_balance_of_the_law_that_is_told(leaking, named):
+    problem = pose(chamber_decay.rig(), leaking[:1])
+    found = locate(problem, leaking[:1])
+    told = _where_told(problem, leaking[:1], found, SimpleNamespace(balances=(named,)))
+
+    assert told.balance == named and told.certain
+    assert told.by_law == (named != found.balance)
+    assert told.term_name == {"chamber.mass": "mass_flow_kg_s"}.get(named, "heat_flow_w")
+    assert told.by_balance == pytest.approx(found.by_balance)
+    assert _where_told(problem, leaking[:1], found, None) is found
 
 
 def test_where_nothing_was_recorded_for_long_nothing_is_told_of_what_is_missing(leaking):

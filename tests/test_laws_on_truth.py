@@ -12,6 +12,7 @@ import pytest
 from studies.hidden_benches import SERVO_DRIVE
 from studies.hidden_effects import recordings
 from studies.truth.cases import read_cases
+from workbench.diagnosis.diagnose import _where_told
 from workbench.diagnosis.law import empirical_law
 from workbench.diagnosis.scan import scan_catalogue
 from workbench.diagnosis.where import locate
@@ -38,7 +39,10 @@ def law_in(hidden):
     train, held_out = made()[hidden]
     problem = pose(SERVO_DRIVE.user_rig(CASES[hidden, 1]), [train], [held_out])
     where = locate(problem, [train])
-    return empirical_law(problem, scan_catalogue(problem), where=where)
+    law = empirical_law(problem, scan_catalogue(problem), where=where)
+    if law:
+        assert _where_told(problem, [train], where, law).balance in law.balances
+    return law
 
 
 @pytest.mark.slow

@@ -13,6 +13,7 @@ from studies.figures.diagnosis import diagnosis_figures
 from studies.hidden_benches import SERVO_DRIVE
 from studies.hidden_effects import recordings
 from studies.page.missing_term import _head
+from studies.text_of_results import where_text
 from studies.truth.cases import read_cases
 from workbench.consistency import check, trusted
 from workbench.consistency.noise import untold_noise
@@ -177,6 +178,16 @@ def test_page_and_json_are_as_sure_of_a_balance_as_the_figure(gains, head, marke
     assert list(where.marked) == marked
     assert _head([each.replace("_", " ").replace(".", " ") for each in marked]).count(head) == 1
     assert ([told["balance"], *told["alike"]] if told["certain"] else []) == marked
+
+
+def test_the_balance_of_a_law_stands_though_another_gains_more():
+    gains = {"chamber_a.mass": 2.0, "slide.momentum": 90.0}
+    found = diagnosis(Verdict.NOT_IN_CATALOGUE)
+    found = replace(found, where=replace(found.where, by_balance=gains, by_law=True))
+    told = diagnosis_document(found, {})["where"]
+
+    assert (told["balance"], told["certain"], told["alike"]) == ("chamber_a.mass", True, [])
+    assert "the law acts in chamber_a.mass" in where_text(found)
 
 
 def test_balances_that_gain_alike_are_both_marked():

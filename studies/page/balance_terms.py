@@ -80,4 +80,5 @@ def _term(
         rest=rest,
         course=course,
         imitated=max(1.0 - float(rest.var() / term.var()), 0.0) if term.any() else 0.0,
+        by_law=False,
     )

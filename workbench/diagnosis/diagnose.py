@@ -116,6 +116,7 @@ def diagnose(
         where = replace(where, by_regime=regime_shares(found.problem.base))
     where = where or of_residual(found.problem.base)
     told = _concluded(rig.name, found, where, evidence, progress)
+    told = replace(told, where=_where_told(problem, train, told.where, told.law))
     told = credible(replace(told, warned=warned + told.warned), doubts)
     unsure = unsteady(told.ranking, found.profiles, told.verdict)
     told = replace(told, warned=told.warned + unsure)
@@ -123,6 +124,19 @@ def diagnose(
         return told
     asked = recommended(found.problem, told.verdict, told.ranking, progress)
     return replace(told, next_recording=asked)
+
+
+def _where_told(
+    problem: Problem, train: Sequence[Recording], where: Where | None, law: Law | None
+) -> Where | None:
+    """The missing term in the balance of a law that is told; else where the smoother puts it.
+
+    They differ where outputs tell more of another balance, sample by sample, than of the law's own.
+    """
+    if law is None or where is None or where.balance in law.balances:
+        return where
+    own = locate(problem, train, law.balances)
+    return replace(own, by_regime=where.by_regime) if own else where
 
 
 @dataclass(frozen=True)

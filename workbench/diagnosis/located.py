@@ -23,7 +23,7 @@ class Where:
         none is likelier.
     balance
         The one that gains most; of the gas of a chamber and its heat the gas, unless the heat gains
-        clearly more.
+        clearly more.  That of an empirical law where one is told (``by_law``): windows found it.
     term
         Its missing term over the training recordings, shape (n,), in SI, named by ``term_name``
         with its unit, for example ``force_n``.
@@ -52,17 +52,20 @@ class Where:
     by_regime: Mapping[str, float]
     intensities: Intensities | None = None
     imitated: float = 0.0
+    by_law: bool = False
     rest: np.ndarray | None = field(default=None, repr=False)
     course: Course | None = field(default=None, repr=False)
 
     @property
     def certain(self) -> bool:
-        """True where the balance gains more than chance gives."""
-        return self.by_balance.get(self.balance, 0.0) > LEAST_GAIN
+        """True where the balance gains more than chance gives, or a law tells it."""
+        return self.by_law or self.by_balance.get(self.balance, 0.0) > LEAST_GAIN
 
     @property
     def alike(self) -> tuple[str, ...]:
         """Other balances that gain as much as the named one, but for what chance gives."""
+        if self.by_law:
+            return ()
         least = max(self.by_balance.get(self.balance, 0.0) - LEAST_GAIN, 0.0)
         gaining = (name for name, gain in self.by_balance.items() if gain > least)
         return tuple(name for name in gaining if name != self.balance)

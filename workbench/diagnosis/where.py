@@ -15,7 +15,7 @@ Source: diagnosis.md 1.3; Kristensen, Madsen and Jorgensen 2004 (significant dif
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -49,11 +49,14 @@ CLEARLY_MORE = 1.05  # times the gain of the mass balance
 INTO_GAS = (Balance.VALVE, Balance.FLOW, Balance.MASS, Balance.ENERGY, Balance.SUPPLY)
 
 
-def locate(problem: Problem, recordings: Sequence[Recording]) -> Where | None:
+def locate(
+    problem: Problem, recordings: Sequence[Recording], among: Collection[str] = ()
+) -> Where | None:
     """Log-likelihood gain of each balance, and the missing flow of the one that gains most.
 
-    All recordings are followed one after the other.  None for a plant without states, or where no
-    filter run stayed finite or met a sample.
+    All recordings are followed one after the other.  With ``among`` the one is sought among these
+    balances, which an empirical law names.  None for a plant without states, or where no filter run
+    stayed finite or met a sample, or none of these balances can be followed.
     """
     plant, flows = with_missing_flows(problem.whole.lean())
     windows, recording = problem.base.windows, joined(recordings)
@@ -68,9 +71,10 @@ def locate(problem: Problem, recordings: Sequence[Recording]) -> Where | None:
         return recording_filter(plant, recording, unknown, noise, astray.process, decimate)
 
     gains = _gains(suspected, lacking, recording)
-    if not gains:
+    asked = {s: by for s, by in gains.items() if not among or s.balance in among}
+    if not asked:
         return None
-    worst = _worst(gains)
+    worst = _worst(asked)
     likeliest = max(gains[worst], key=lambda q: gains[worst][q])
     neighbour = _neighbour(gains[worst], likeliest)
     filters = lacking({worst.parameter: likeliest})
@@ -95,6 +99,7 @@ def locate(problem: Problem, recordings: Sequence[Recording]) -> Where | None:
         by_regime=regime_shares(problem.base),
         intensities=Intensities(likeliest, neighbour, softer),
         imitated=max(1.0 - float(rest.var() / term.var()), 0.0) if term.any() else 0.0,
+        by_law=bool(among),
         rest=rest,
         course=course,
     )
