@@ -10,14 +10,18 @@ from test_fitting import NOISE, sines
 
 from studies.hidden_cases import removed_share
 from studies.text_of_results import moved_text, strained_text
+from workbench.diagnosis import settle
 from workbench.diagnosis.addition import accept, assembled
 from workbench.diagnosis.diagnose import diagnose
 from workbench.diagnosis.improvement import Change
+from workbench.diagnosis.judge import reasons_against
+from workbench.diagnosis.put_back import in_its_place
 from workbench.diagnosis.refit import refit_shift
 from workbench.diagnosis.result import Kind, Verdict
 from workbench.diagnosis.rounds import Rounds
 from workbench.diagnosis.scan import scan_catalogue
 from workbench.diagnosis.shifts import shifts
+from workbench.diagnosis.size import Size
 from workbench.diagnosis.verdict import held
 from workbench.fitting.posterior import fitted_rig, moved_parameters
 from workbench.fitting.problem import BELIEVED, pose
@@ -63,6 +67,38 @@ def test_a_parameter_that_is_held_shifts_to_where_the_recording_has_it(believing
     assert shift.size.value == pytest.approx(found.size[FRICTION].value, rel=0.1)
     assert found.size[FRICTION].value == pytest.approx(TRUE_N, rel=0.05)
     assert shift.drop == pytest.approx(found.drop_train, abs=0.1)
+
+
+@pytest.mark.parametrize(("deviations", "left"), [(2.9, False), (3.1, True)])
+def test_a_shift_is_named_where_it_leaves_its_prior_by_three_deviations(
+    believing, deviations, left
+):
+    """The linear model that chose it to be refitted may promise more."""
+    (shift,) = [each for each in shifts(believing) if each.name == FRICTION]
+    size = Size(BELIEVED_N + deviations * DEVIATION_N, 1e-3, 1e-3)
+    found = replace(refit_shift(believing, shift), size={FRICTION: size})
+    reason = "friction.coulomb_force stays within 3 deviations of its prior"
+
+    assert (reason not in reasons_against(believing.base, found)) == left
+
+
+def test_the_sizes_of_what_leads_are_looked_for_beside_those_of_a_shift_too(monkeypatch):
+    """A dead volume is a shift of what the rig has: its fitted parameter, not its strength."""
+    looked_at = []
+    monkeypatch.setattr(settle, "settled", lambda fit, *added: fit)
+    monkeypatch.setattr(settle, "resized", lambda fit, names, rounds: looked_at.extend(names))
+    volume = servo_drive().candidates["dead_volume@chamber_a"]
+    settle.settled_leader(None, volume)
+
+    assert looked_at == [volume.strength, volume.held] and volume.held.startswith("chamber_a.")
+
+
+def test_a_rival_that_is_there_already_is_a_shift_without_its_prior(believing):
+    found = in_its_place(believing, believing.whole.candidates["coulomb_friction"])
+    unknowns = found.fit.unknowns
+
+    assert not unknowns.with_prior[unknowns.names.index(FRICTION)]
+    assert found.size[FRICTION].value == pytest.approx(TRUE_N, rel=0.05)
 
 
 def test_a_parameter_that_is_held_shifts_no_further_than_its_bound():

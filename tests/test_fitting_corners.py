@@ -217,3 +217,12 @@ def test_a_refit_from_the_priors_needs_no_shape_that_was_not_scanned():
     assert found.fit.windows.plant.values["friction.wavelength_m"] == pytest.approx(
         rig.plant.values["friction.wavelength_m"]
     )
+
+
+def test_a_recording_without_measurements_is_not_held_out():
+    """Of a vessel it was a division by zero, of a drive it silently refused every effect."""
+    empty = bench(2, coulomb)
+    empty["rod.force_n"][:] = np.nan
+
+    with pytest.raises(ValueError, match=f"{empty.name}: no output is recorded in what is held"):
+        pose(load_rig('plant = "cylinder_bench"'), [bench(1, coulomb)], [empty])

@@ -4,6 +4,7 @@
 
 from dataclasses import replace
 from math import nan
+from types import SimpleNamespace
 
 import pytest
 from test_improvement import rig, sets, steps_of  # noqa: F401
@@ -78,6 +79,35 @@ def test_the_rig_file_holds_the_notes_of_the_end(rig, sets, pair, monkeypatch):
     assert load_rig(rig_text(found.rig)).notes == (
         "coulomb_friction: weighted misfit 31% smaller in training, 28% in validation",
     )
+
+
+def test_what_a_law_sends_away_is_in_no_note_and_not_among_what_is_kept(
+    rig, sets, pair, monkeypatch
+):
+    first = diagnose(rig, *sets)
+    lawful = replace(first, ranking=(), law=SimpleNamespace(steps=()))
+    done = Rounds(rig, kept=pair, steps=pair.steps).told(lawful)
+    friction, force = pair.steps
+
+    def without(done, last, *asked):
+        return replace(done, kept=replace(done.kept, steps=done.kept.without(force))), last
+
+    monkeypatch.setattr(improving, "forward", lambda *asked: done)
+    monkeypatch.setattr(improving.Passes, "removal", lambda self, kept, s: (asked(s, 1, 1), kept))
+    monkeypatch.setattr(improving.Passes, "swaps", lambda self, kept, step: ([], kept))
+    monkeypatch.setattr(improving, "_without_needless", without)
+    monkeypatch.setattr(improving, "_with_terms", lambda done, *asked: done)
+    found = improving.improve(rig, *sets, law=True)
+
+    assert found.kept == found.rig.added == (friction.candidate.name,)
+    assert not any(force.candidate.name in note for note in found.rig.notes)
+
+
+def test_a_share_is_of_what_stayed_and_not_of_when_it_went(pair):
+    """What the backward pass drops a swap may bring back."""
+    went = asked(pair.steps[0], 0.01, 0.0, dropped=True)
+
+    assert last(with_last_notes(pair, pair.steps, (went,))) == last(pair)
 
 
 def test_the_note_of_what_is_accepted_says_what_it_is_not_told_apart_from(rig, sets):

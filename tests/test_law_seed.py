@@ -2,12 +2,15 @@
 
 from dataclasses import replace
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from test_report import diagnosis
 
+from workbench.diagnosis import law
 from workbench.diagnosis.law_seed import seeds
+from workbench.diagnosis.law_told import _balances
 from workbench.diagnosis.missing_term import Course
 from workbench.plants import PLANTS
 from workbench.rig_laws import is_law, law_terms, with_laws
@@ -68,3 +71,27 @@ def test_a_force_at_one_place_is_three_terms_that_none_of_them_is_alone():
 
 def test_what_no_term_explains_gives_no_law():
     assert read_off(10.0 * np.random.default_rng(7).standard_normal(SAMPLES)) == []
+
+
+def test_a_term_that_the_rig_has_is_none_to_look_for(monkeypatch):
+    """What is missing of it is no coefficient of its own."""
+    there, absent = TERMS[:2]
+    looked_for = []
+    problem = SimpleNamespace(whole=WHOLE, added=(there,))
+    monkeypatch.setattr(law, "with_terms", lambda problem: problem)
+    for way in ("_term_by_term", "_at_once"):
+        monkeypatch.setattr(law, way, lambda problem, terms, *of: looked_for.append(terms))
+
+    assert law.empirical_law(problem, ()) is None
+    assert all(absent in terms and there not in terms for terms in looked_for)
+    assert len(looked_for) == 2
+
+
+def test_a_force_on_a_rod_is_in_the_balance_of_its_joint():
+    plant = PLANTS["crr_arm"]()
+    names = ("law[v|v|]@rod", "law[constant]@cap")
+    terms = [
+        c for name, c in with_laws(plant, law_terms(plant)).candidates.items() if name in names
+    ]
+
+    assert {*_balances(plant, terms)} == {"joint.momentum", "cap.mass"}

@@ -116,8 +116,8 @@ def diagnose(
         where = replace(where, by_regime=regime_shares(found.problem.base))
     where = where or of_residual(found.problem.base)
     told = _concluded(rig.name, found, where, evidence, progress)
-    told = replace(told, where=_where_told(problem, train, told.where, told.law))
     told = credible(replace(told, warned=warned + told.warned), doubts)
+    told = replace(told, where=_where_told(problem, train, told.where, told.law))
     unsure = unsteady(told.ranking, found.profiles, told.verdict)
     told = replace(told, warned=told.warned + unsure)
     if told.contradicted and not told.too_short:

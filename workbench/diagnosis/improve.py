@@ -65,8 +65,12 @@ def improve(
     done = forward(Rounds(rig), train, validation, progress, law)
     if not done.stopped:
         done = _thought_over(done, *kept, progress)
+    last = None
     if law and not done.stopped:
-        done = _with_law(done, train, validation, progress)
+        done, last = _asked_for_law(done, train, validation, progress)
+    done = _with_notes(done)
+    if last:
+        done = _with_terms(done, last, progress)
     return _improvement(done, *kept, progress)
 
 
@@ -86,6 +90,11 @@ def _thought_over(
     except KeyboardInterrupt:
         progress("stopped in the second thoughts: what is finished stays")
         done = replace(done, stopped=True)
+    return done
+
+
+def _with_notes(done: Rounds) -> Rounds:
+    """What is kept with its last notes, once all that goes again is gone."""
     if done.kept is None:
         return done
     return replace(done, kept=with_last_notes(done.kept, done.steps, done.removals, done.swaps))
@@ -118,16 +127,17 @@ def _swapped(done: Rounds, passes: Passes, step: Addition) -> Rounds:
     return done.marked(label, kept.fit, kept.validation, Change.SWAPPED)
 
 
-def _with_law(
+def _asked_for_law(
     done: Rounds,
     train: Sequence[Recording],
     validation: Sequence[Recording],
     progress: Progress,
-) -> Rounds:
-    """An empirical law on top, where nothing of the catalogue earns its place and one passes.
+) -> tuple[Rounds, Diagnosis | None]:
+    """The diagnosis with a law, where one passes and nothing of the catalogue earns its place.
 
-    The second thoughts asked only what was there.  Where they changed it, another effect may be
-    missing now: then no law is taken, and it is told.
+    Without those effects to which the law leaves nothing; None where no law is to be taken.  The
+    second thoughts asked only what was there.  Where they changed it, another effect may be missing
+    now: then no law is taken, and it is told.
     """
     steps = done.kept.steps if done.kept else ()
     current, last = assembled(done.rig, steps), done.diagnoses[-1]
@@ -141,14 +151,18 @@ def _with_law(
             )
     except KeyboardInterrupt:
         progress("stopped before the empirical law")
-        return replace(done, stopped=True)
+        return replace(done, stopped=True), None
     if last.law is None or comes_first(last):
-        return done
+        return done, None
     try:
-        done, last = _without_needless(done, last, train, validation, progress)
+        return _without_needless(done, last, train, validation, progress)
     except KeyboardInterrupt:
         progress("stopped beside the empirical law")
-        return replace(done, stopped=True)
+        return replace(done, stopped=True), None
+
+
+def _with_terms(done: Rounds, last: Diagnosis, progress: Progress) -> Rounds:
+    """The terms of the law that a diagnosis tells on top of what is kept."""
     current = assembled(done.rig, done.kept.steps if done.kept else ())
     for step in accept_law(current, last.law, last.before, last.evidence):
         progress(f"empirical: {step.candidate.name}")
@@ -208,6 +222,8 @@ def _improvement(
     elif done.kept and done.kept.steps:
         fit, held_out = done.last_fit
         final = fitted_rig(assembled(done.rig, done.kept.steps), fit)
+    terms = done.law.steps if done.law else ()
+    kept = (*(done.kept.names if done.kept else ()), *(term.candidate.name for term in terms))
     if final is not done.rig:
         steps = (*(done.kept.steps if done.kept else ()), *(done.steps if done.law else ()))
         added = unknown_forms(done.rig, (step.candidate for step in steps))
@@ -223,6 +239,7 @@ def _improvement(
     return Improvement(
         rig=final,
         steps=done.steps,
+        kept=kept,
         diagnoses=done.diagnoses,
         removals=done.removals,
         swaps=done.swaps,

@@ -61,6 +61,8 @@ class Improvement:
     ----------
     steps
         What the rounds added, in order, the terms of a law at the end; also what was dropped later.
+    kept
+        Public names, with places, of what the final rig has more than the first.
     diagnoses
         One for each round, and one more where an effect that a round had refused came in with the
         next one, and where a law was asked for after the second thoughts had changed the model;
@@ -98,6 +100,7 @@ class Improvement:
 
     rig: Rig
     steps: tuple[Addition, ...]
+    kept: tuple[str, ...]
     diagnoses: tuple[Diagnosis, ...]
     removals: tuple[Removal, ...]
     swaps: tuple[Swap, ...]
@@ -140,14 +143,6 @@ class Improvement:
         null = {name: known.null for name, known in self.rig.plant.parameters.items()}
         used = (row for row in self.parameters if row.before == null.get(row.name))
         return tuple(row for row in used if row.far > CLEARLY_USED and _shown(row))
-
-    @property
-    def kept(self) -> tuple[str, ...]:
-        """Public names, with places, of what the final rig has more than the first."""
-        names = [step.candidate.name for step in self.steps]
-        gone = [each.candidate.name for each in self.removals if each.dropped]
-        swapped = {s.candidate.name: s.rival.name for s in self.swaps if s.replaced}
-        return tuple(swapped.get(name, name) for name in names if name not in gone)
 
 
 def _shown(row: Moved) -> bool:

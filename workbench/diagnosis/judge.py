@@ -14,7 +14,7 @@ the criterion.  A candidate is accepted when
    recordings and with no less than 10 % in training: less may stand for something else,
 4. its size is inside its bounds, more than 3 % of typical, and more than two standard deviations
    from none, as the curvature of the cost tells these with its forms held; of a parameter that is
-   there already, from what is believed of it.
+   there already, from what is believed of it, which it is to leave by three of its deviations.
 
 A pair pays for the parameters of both, takes twice the share, and both sizes must be sound.
 """
@@ -27,6 +27,7 @@ from math import exp, isclose, isnan, log, sqrt
 from workbench.candidate import Candidate
 from workbench.diagnosis.refit import Refit
 from workbench.diagnosis.result import Law, Ranked
+from workbench.diagnosis.shifts import LEAVES_PRIOR, stays
 from workbench.diagnosis.size import distinct
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.own_errors import effective_by_output
@@ -139,12 +140,16 @@ def _reasons_of_size(base: Fit, found: Refit | Ranked, candidate: Candidate) -> 
         return []
     known, there = found.fit.plant.parameters[name], base.unknowns
     absent = known.null or 0.0
-    size, null = found.size[name].value, absent
+    size, null, least = found.size[name].value, absent, 0.0
     if name in there.names and there.with_prior[there.names.index(name)]:
-        null = float(there.prior[there.names.index(name)])
+        row = there.names.index(name)
+        null, scale = float(there.prior[row]), float(there.scale[row])
+        least = 0.0 if candidate.cause.tolerated else LEAVES_PRIOR * scale
     reasons = []
     if abs(size - null) < LEAST_SIZE * abs(known.typical):
         reasons.append("its size is negligible")
+    elif abs(size - null) < least:
+        reasons.append(stays(name))
     elif not distinct(found.size[name], null):
         reasons.append(SIZE_REASON)
     ends = (end for end in (known.lower, known.upper) if end not in (null, absent, known.typical))

@@ -22,7 +22,7 @@ def with_last_notes(
 
     ``began`` is all that came in, in its rounds; ``swaps`` are rivals tried in its place.
     """
-    asked = {each.candidate.name: each for each in removals}
+    asked = {each.candidate.name: each for each in removals if not each.dropped}
     steps = []
     for step in kept.steps:
         partner = next((s for s in began if s is not step and s.fit is step.fit), None)

@@ -56,7 +56,8 @@ def empirical_law(
     (:mod:`workbench.diagnosis.law_seed`); they are taken where they leave clearly less.
     """
     problem = with_terms(problem)
-    terms = [c for c in problem.whole.candidates.values() if is_law(c.name)]
+    laws = (c for c in problem.whole.candidates.values() if is_law(c.name))
+    terms = [each for each in laws if each not in problem.added]
     law = _term_by_term(problem, terms, known, to_beat)
     other = _at_once(problem, terms, where)
     if law is None or other is None:

@@ -22,6 +22,8 @@ from workbench.diagnosis.size import Size, distinct, sizes
 from workbench.fitting.gauss_newton import Fit
 from workbench.fitting.problem import Problem
 from workbench.law_range import seen_in
+from workbench.linkage import JointRod
+from workbench.plant import Plant
 from workbench.units import display_scale, display_unit
 
 
@@ -32,10 +34,17 @@ def law_of(found: Refit, steps: Sequence[LawTerm]) -> Law:
     windows = found.fit.windows
     plant = windows.plant.lean(keep=[term.member for term in accepted])
     ranges = seen_in(plant, windows.recordings)
-    balances = tuple(dict.fromkeys(f"{c.place}.{c.cause.balance.value}" for c in accepted))
     drops = (found.drop_train, found.drop_validation)
     told = _text(accepted, terms.values())
+    balances = _balances(windows.plant, accepted)
     return Law(balances, terms, ranges, *drops, told, tuple(steps), found.fit, found.validation)
+
+
+def _balances(plant: Plant, terms: Iterable[Candidate]) -> tuple[str, ...]:
+    """Those of the terms, as plants name them: a force on a rod is in the balance of its joint."""
+    joints = {part.name: part.joint for part in plant.parts if isinstance(part, JointRod)}
+    at = ((joints.get(c.place or "", c.place), c.cause.balance.value) for c in terms)
+    return tuple(dict.fromkeys(f"{place}.{balance}" for place, balance in at))
 
 
 def settled_law(problem: Problem, law: Law) -> Law:

@@ -36,8 +36,8 @@ def in_its_place(problem: Problem, candidate: Candidate) -> Refit | None:
     names = problem.whole.candidates
     if candidate.name not in names or not problem.whole.ready_for(candidate):
         return None
-    if candidate.held in base.unknowns.names:
-        return _shifted(problem, candidate)
+    if shifted := _shifted(problem, candidate):
+        return shifted
     at = base.windows, base.unknowns, base.point
     profiles = scan(problem.whole, *at, [candidate], base.derivatives, problem.rig.fixed)
     if not profiles:

@@ -13,7 +13,7 @@ from workbench.diagnosis.refit import Refit
 from workbench.diagnosis.result import DecidedBy, Ranked
 from workbench.diagnosis.scan import Profile
 from workbench.diagnosis.score import modification_index
-from workbench.diagnosis.shifts import LEAVES_PRIOR, Shift
+from workbench.diagnosis.shifts import Shift, stays
 from workbench.diagnosis.ties import LARGEST_TIE, imitation, tie_group
 from workbench.effect import Kind
 from workbench.fitting.problem import Problem
@@ -140,7 +140,6 @@ def refitted_row(
 
 def _shifted(problem: Problem, shift: Shift) -> Ranked:
     """A shift that was not refitted counts by what freeing it would bring."""
-    stays = (f"{public_name(shift.name)} stays within {LEAVES_PRIOR:g} deviations of its prior",)
     return Ranked(
         candidate=shift.candidate,
         kind=Kind.PARAMETER,
@@ -151,7 +150,7 @@ def _shifted(problem: Problem, shift: Shift) -> Ranked:
         compensable=1.0,
         decided_by=DecidedBy.SCAN,
         accepted=False,
-        reasons=("only a shift of a fitted parameter",) if shift.leaves else stays,
+        reasons=("only a shift of a fitted parameter",) if shift.leaves else (stays(shift.name),),
         rig_value=problem.rig.plant.values[shift.name],
     )
 

@@ -61,8 +61,9 @@ def settled(fit: Fit, *added: Candidate) -> Fit:
 
 def settled_leader(fit: Fit, *added: Candidate) -> Fit:
     """:func:`settled`, and its sizes looked for beside it too."""
-    strengths = tuple(each.strength for all_of in added for each in all_of.singles)
-    return resized(settled(fit, *added), strengths, ITERATIONS)
+    singles = (each for all_of in added for each in all_of.singles)
+    moved = tuple(name for each in singles for name in (each.strength, each.held) if name)
+    return resized(settled(fit, *added), moved, ITERATIONS)
 
 
 def settled_refit(problem: Problem, found: Refit) -> Refit:

@@ -21,6 +21,7 @@ from workbench.candidate import Candidate
 from workbench.diagnosis.size import Size
 from workbench.fitting.linearised import Normal, normal_equations
 from workbench.fitting.problem import Problem
+from workbench.units import public_name
 
 LEAVES_PRIOR = 3.0
 
@@ -43,6 +44,11 @@ class Shift:
     def leaves(self) -> bool:
         """True where the parameter leaves its prior."""
         return abs(self.deviations) > LEAVES_PRIOR
+
+
+def stays(name: str) -> str:
+    """Why a shift of a parameter is none, in words."""
+    return f"{public_name(name)} stays within {LEAVES_PRIOR:g} deviations of its prior"
 
 
 def shifts(problem: Problem) -> list[Shift]:

@@ -179,7 +179,8 @@ def pose(
     Raises
     ------
     ValueError
-        If the recordings hold no whole window, differ in their sample times, or show no noise.
+        If the recordings hold no whole window, differ in their sample times, or show no noise, or
+        if nothing is recorded in what is held out.
     """
     one_clock([*train, *validation])
     whole = rig.fit_for(train[0])
@@ -188,6 +189,7 @@ def pose(
     noise = measured_noise(train, plant.measured)
     length_s = window_length_s(plant, train, validation)
     windows = cut_windows(plant, train, noise, length_s, most_windows)
+    unseen = _unseen(windows, validation)
     unknowns = nominal_unknowns(plant, rig.deviations, rig.held, added, believed)
     progress(f"prior fit of {len(unknowns)} parameters to {len(windows)} windows")
     first = fitted_twice(windows, unknowns, unknowns.scaled(plant.values))
@@ -196,13 +198,30 @@ def pose(
     progress("prior fit from points beside it")
     base = no_worse_than_it_came(shaken(found, ITERATIONS))
     held_out = None
-    if validation:
+    if unseen is not None:
         progress("prior fit on what is held out")
-        # half as many as the training has are enough to judge a plant that is not fitted to them
-        most = max(len(windows) // 2, LEAST_HELD_OUT_WINDOWS)
-        cut_s = windows.length * train[0].sample_time_s
-        held_out = held_out_fit(cut_windows(plant, validation, noise, cut_s, most), base)
+        held_out = held_out_fit(unseen, base)
     return Problem(rig, whole, added, base, held_out, believed)
+
+
+def _unseen(windows: Windows, validation: Sequence[Recording]) -> Windows | None:
+    """Windows of what is held out, cut as those of the training; None where nothing is.
+
+    Half as many as the training has are enough to judge a plant that is not fitted to them.
+    """
+    if not validation:
+        return None
+    most = max(len(windows) // 2, LEAST_HELD_OUT_WINDOWS)
+    cut_s = windows.length * windows.recordings[0].sample_time_s
+    noise = dict(zip(windows.plant.measured, windows.noise.tolist(), strict=True))
+    unseen = cut_windows(windows.plant, validation, noise, cut_s, most)
+    if not unseen.count:
+        names = ", ".join(each.name for each in validation)
+        raise ValueError(
+            f"{names}: no output is recorded in what is held out, so nothing can be judged on it; "
+            "expected a recording with measurements (--validate)"
+        )
+    return unseen
 
 
 def posed(rig: Rig, base: Fit, base_validation: Fit | None) -> Problem:
